@@ -1,0 +1,133 @@
+//! What a camera delivers: lines, and when each was exposed.
+
+use core::fmt;
+
+/// When the rows of a frame are exposed.
+///
+/// Row `y` of a frame whose first row starts its exposure at `t` is exposed during
+/// `[t + y·line_time, t + y·line_time + exposure]`. A line time of zero is a global shutter.
+///
+/// ```
+/// use rowtone::camera::Timing;
+/// let timing = Timing::new(18_900_000, 500_000, 1080)?; // IMX219 at 1080p, exposed for 0.5 ms
+/// assert_eq!(timing.middle_ns(0), 250_000);
+/// assert_eq!(timing.middle_ns(1000), 18_900_000 + 250_000);
+/// # Ok::<(), rowtone::camera::TimingError>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Timing {
+    line_time_ps: u32,
+    exposure_ns: u32,
+    rows: u16,
+}
+
+impl Timing {
+    /// `line_time_ps`: picoseconds from one row to the next, 0 to 4.29 ms (a calibration knows it to
+    /// parts in 100 000, so whole nanoseconds would not do). `exposure_ns`: exposure of a row,
+    /// 0 to 4.29 s. `rows`: rows of a frame, at least 1.
+    ///
+    /// # Errors
+    /// [`TimingError::NoRows`] when `rows` is 0.
+    pub const fn new(line_time_ps: u32, exposure_ns: u32, rows: u16) -> Result<Self, TimingError> {
+        if rows == 0 {
+            return Err(TimingError::NoRows);
+        }
+        Ok(Self {
+            line_time_ps,
+            exposure_ns,
+            rows,
+        })
+    }
+
+    /// Time from one row to the next, ps.
+    pub const fn line_time_ps(&self) -> u32 {
+        self.line_time_ps
+    }
+
+    /// Exposure of a row, ns.
+    pub const fn exposure_ns(&self) -> u32 {
+        self.exposure_ns
+    }
+
+    /// Rows of a frame.
+    pub const fn rows(&self) -> u16 {
+        self.rows
+    }
+
+    /// All rows are exposed at once.
+    pub const fn is_global_shutter(&self) -> bool {
+        self.line_time_ps == 0
+    }
+
+    /// Start of exposure of `row` after that of row 0, ns, rounded down.
+    pub const fn start_ns(&self, row: u16) -> i64 {
+        (row as u64 * self.line_time_ps as u64 / 1000) as i64
+    }
+
+    /// Middle of exposure of `row` after the start of exposure of row 0, ns: the sample time.
+    pub const fn middle_ns(&self, row: u16) -> i64 {
+        self.start_ns(row) + (self.exposure_ns / 2) as i64
+    }
+
+    /// Time from the first row's start to one line time after the last row's, ns.
+    pub const fn readout_ns(&self) -> i64 {
+        self.start_ns(self.rows)
+    }
+}
+
+/// Why a [`Timing`] was refused.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TimingError {
+    /// A frame has at least one row.
+    NoRows,
+}
+
+impl fmt::Display for TimingError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NoRows => f.write_str("a frame needs at least one row"),
+        }
+    }
+}
+
+impl core::error::Error for TimingError {}
+
+/// The pixels of a line as the kernels read them.
+///
+/// Packed raw formats are unpacked to `U16` first. Deeper pixels need no scaling: a line is only
+/// ever compared with its own reference.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Pixels<'a> {
+    /// 8-bit luma or raw.
+    U8(&'a [u8]),
+    /// 9- to 16-bit luma or raw, one pixel a word.
+    U16(&'a [u16]),
+}
+
+impl Pixels<'_> {
+    /// Pixels in the line.
+    pub const fn len(&self) -> usize {
+        match self {
+            Self::U8(p) => p.len(),
+            Self::U16(p) => p.len(),
+        }
+    }
+
+    /// No pixel at all.
+    pub const fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+}
+
+/// One line of one frame, as it leaves the sensor.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Line<'a> {
+    /// Number of the frame, counted by the camera: a lost frame leaves a gap. Wraps at 2³².
+    pub frame: u32,
+    /// Row in the picture (or in the part of it that is used), from 0.
+    pub row: u16,
+    /// Start of this line's exposure, ns on the camera's clock.
+    pub start_ns: i64,
+    /// Its pixels.
+    pub pixels: Pixels<'a>,
+}
