@@ -1,1 +1,10 @@
-//! Host.
+//! The host's side of rowtone: a simulated camera at a simulated machine, video files, and the
+//! command `rowtone`.
+//!
+//! The core (package `rowtone`) knows no file, no serial port and no clock; all of that is here:
+//!
+//! - [`commands`]: one file a command, each with its options and what it does;
+//! - [`failure`]: what every command says, and exits with, when it cannot go on.
+
+pub mod commands;
+pub mod failure;

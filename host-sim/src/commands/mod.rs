@@ -1,0 +1,78 @@
+//! The commands, one file each.
+//!
+//! A command is a file `commands/<name>.rs` with `#[derive(clap::Args)] pub struct Args` and
+//! `pub fn run(args: &Args) -> Result<(), Failure>`, and one variant of [`Command`]. Results go to
+//! standard output; everything else (progress, warnings, the one line of a [`Failure`]) goes to
+//! standard error.
+
+use std::ffi::OsString;
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+use crate::failure::Failure;
+
+pub mod demo;
+
+/// Measures vibration with a rolling-shutter camera: every row of a frame is a sample in time.
+#[derive(Debug, Parser)]
+#[command(name = "rowtone", version, disable_help_subcommand = true)]
+#[command(after_help = "Without a command, `rowtone` runs `rowtone demo`.")]
+struct Cli {
+    #[command(subcommand)]
+    command: Option<Command>,
+}
+
+/// What `rowtone` can do.
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// A simulated camera looks at a simulated machine; its peaks appear beside the truth
+    Demo(demo::Args),
+}
+
+fn run(command: &Command) -> Result<(), Failure> {
+    match command {
+        Command::Demo(args) => demo::run(args),
+    }
+}
+
+/// The whole program: parses `args` (the program's name first), runs the command, prints the one
+/// line of a failure, and says what to exit with.
+pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
+    let cli = match Cli::try_parse_from(args) {
+        Ok(cli) => cli,
+        Err(error) => return answer(&error),
+    };
+    let command = cli.command.unwrap_or(Command::Demo(demo::Args::default()));
+    match run(&command) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => report(&failure),
+    }
+}
+
+/// Prints why the command stopped.
+fn report(failure: &Failure) -> ExitCode {
+    if *failure != Failure::OutputClosed {
+        eprintln!("rowtone: {failure}");
+    }
+    ExitCode::from(failure.status())
+}
+
+/// What the parser of the command line has to say: help and version on standard output, an error as
+/// one line.
+fn answer(error: &clap::Error) -> ExitCode {
+    if !error.use_stderr() {
+        // A closed pipe (`rowtone --help | head -1`) is no error.
+        let _ = error.print();
+        return ExitCode::SUCCESS;
+    }
+    let text = error.to_string();
+    // clap's message, then its usage and hint paragraphs: keep what it says and how to go on.
+    let what = text.split("\n\nUsage:").next().unwrap_or(&text);
+    let what = what.strip_prefix("error: ").unwrap_or(what);
+    let what = what
+        .split("\n\nFor more information")
+        .next()
+        .unwrap_or(what);
+    report(&Failure::usage(format!("{what}; try --help")))
+}
