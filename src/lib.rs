@@ -2,6 +2,13 @@
 #![no_std]
 #![deny(unsafe_code)]
 
+mod align;
+pub mod band;
 pub mod camera;
+pub mod kernel;
+pub mod noise;
+mod pixel;
+pub mod reference;
 pub mod report;
 pub mod timeline;
+pub mod tracker;

@@ -1,0 +1,136 @@
+//! The inner products of a line: the only code that must be fast, and the only unsafe code.
+//!
+//! For pixels `p` and coefficients `h` of equal length each kernel returns Σ h·p and Σ p, exactly, so
+//! all of them give the same bits. The fastest one that the processor offers is chosen once, at start.
+//!
+//! |h| ≤ [`MAX_COEFFICIENT`], so that a pair of products u8 × i8 never leaves 16 bits.
+#![allow(unsafe_code)]
+
+mod portable;
+#[cfg(target_arch = "x86_64")]
+mod x86_64;
+
+/// Largest magnitude of a coefficient: 2·64·255 < 2¹⁵.
+pub const MAX_COEFFICIENT: i8 = 64;
+
+/// Σ h·p and Σ p of one line.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Sums {
+    /// Σ h·p.
+    pub product: i64,
+    /// Σ p.
+    pub pixels: u64,
+}
+
+/// Which implementation is used.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Kernel {
+    /// Plain Rust, for every machine.
+    Portable,
+    /// x86-64 with AVX2: 32 pixels a step.
+    #[cfg(target_arch = "x86_64")]
+    Avx2,
+}
+
+impl Kernel {
+    /// The fastest kernel that this processor can run.
+    pub fn detect() -> Self {
+        #[cfg(target_arch = "x86_64")]
+        if x86_64::available() {
+            return Self::Avx2;
+        }
+        Self::Portable
+    }
+
+    /// All kernels that this processor can run, [`Kernel::Portable`] first.
+    pub fn all() -> impl Iterator<Item = Self> {
+        let best = Self::detect();
+        core::iter::once(Self::Portable).chain((best != Self::Portable).then_some(best))
+    }
+
+    /// Sums over 8-bit pixels. The shorter length of the two counts. |h| ≤ [`MAX_COEFFICIENT`], or the
+    /// sums are unspecified (never unsafe).
+    #[inline]
+    pub fn sums_u8(self, pixels: &[u8], coefficients: &[i8]) -> Sums {
+        match self {
+            Self::Portable => portable::sums_u8(pixels, coefficients),
+            // SAFETY: the variant is only made by `detect`, which asked the processor for AVX2.
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2 => unsafe { x86_64::sums_u8(pixels, coefficients) },
+        }
+    }
+
+    /// Sums over 16-bit pixels, as [`Kernel::sums_u8`].
+    #[inline]
+    pub fn sums_u16(self, pixels: &[u16], coefficients: &[i8]) -> Sums {
+        match self {
+            Self::Portable => portable::sums_u16(pixels, coefficients),
+            // SAFETY: the variant is only made by `detect`, which asked the processor for AVX2.
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2 => unsafe { x86_64::sums_u16(pixels, coefficients) },
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    extern crate std;
+    use std::vec::Vec;
+
+    /// A small generator: the tests need nothing better (Knuth's MMIX constants).
+    fn bytes(seed: u64, n: usize) -> impl Iterator<Item = u8> {
+        let mut state = seed;
+        (0..n).map(move |_| {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            (state >> 56) as u8
+        })
+    }
+
+    #[test]
+    fn all_kernels_give_the_same_bits() {
+        for n in (0..200).chain([255, 256, 257, 640, 1536, 4096, 8192]) {
+            let h: Vec<i8> = bytes(n as u64, n).map(|b| (b % 129) as i8 - 64).collect();
+            let p: Vec<u8> = bytes(n as u64 + 7, n).collect();
+            let deep: Vec<u16> = bytes(3, 2 * n)
+                .collect::<Vec<_>>()
+                .chunks(2)
+                .map(|b| u16::from_le_bytes([b[0], b[1]]))
+                .collect();
+            let (full, full_deep) = (std::vec![255u8; n], std::vec![65535u16; n]);
+            let signs: Vec<i8> = h.iter().map(|&h| if h < 0 { -64 } else { 64 }).collect();
+            for kernel in Kernel::all() {
+                for (p, h) in [(&p, &h), (&full, &signs)] {
+                    assert_eq!(
+                        kernel.sums_u8(p, h),
+                        portable::sums_u8(p, h),
+                        "{kernel:?} {n}"
+                    );
+                }
+                for (p, h) in [(&deep, &h), (&full_deep, &signs)] {
+                    let exact = Sums {
+                        product: p
+                            .iter()
+                            .zip(h)
+                            .map(|(&p, &h)| i64::from(p) * i64::from(h))
+                            .sum(),
+                        pixels: p.iter().map(|&p| u64::from(p)).sum(),
+                    };
+                    assert_eq!(kernel.sums_u16(p, h), exact, "{kernel:?} {n}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_shorter_side_counts() {
+        for kernel in Kernel::all() {
+            assert_eq!(kernel.sums_u8(&[1, 2, 3], &[10, 10]).product, 30);
+            assert_eq!(kernel.sums_u16(&[1], &[10, 10, 10]).product, 10);
+            assert_eq!(kernel.sums_u8(&[], &[]), Sums::default());
+        }
+    }
+}
