@@ -93,7 +93,9 @@ mod tests {
     #[test]
     fn all_kernels_give_the_same_bits() {
         for n in (0..200).chain([255, 256, 257, 640, 1536, 4096, 8192]) {
-            let h: Vec<i8> = bytes(n as u64, n).map(|b| (b % 129) as i8 - 64).collect();
+            let h: Vec<i8> = bytes(n as u64, n)
+                .map(|b| (i16::from(b % 129) - 64) as i8)
+                .collect();
             let p: Vec<u8> = bytes(n as u64 + 7, n).collect();
             let deep: Vec<u16> = bytes(3, 2 * n)
                 .collect::<Vec<_>>()
