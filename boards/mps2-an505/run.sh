@@ -1,0 +1,54 @@
+#!/usr/bin/env bash
+# Run the firmware under QEMU on a clip: text reports as the board's UART sends them, on standard output.
+set -euo pipefail
+
+usage() {
+    cat >&2 <<'USAGE'
+usage: boards/mps2-an505/run.sh CLIP.y4m --line-time-us T [--exposure-us T] [--fps F] [--window S] [--icount]
+example: boards/mps2-an505/run.sh motor.y4m --line-time-us 40 --exposure-us 500 --icount
+
+  --line-time-us T   time from one row to the next
+  --exposure-us T    exposure of a row (default 0)
+  --fps F            frame rate, Hz (default: the clip's)
+  --window S         length of a report's window, s (default 1.0)
+  --icount           count instructions, and print one line of figures at the end
+USAGE
+    exit 2
+}
+
+here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
+root=$(cd "$here/../.." && pwd)
+clip='' line_time='' exposure=0 fps='' window=1.0 icount=0
+while [ $# -gt 0 ]; do
+    case $1 in
+        --line-time-us | --exposure-us | --fps | --window)
+            [ $# -ge 2 ] || usage
+            [[ $2 =~ ^[0-9]*\.?[0-9]+([eE][-+]?[0-9]+)?$ ]] || { echo "run.sh: $1: '$2' is no number" >&2; exit 2; }
+            case $1 in
+                --line-time-us) line_time=$2 ;;
+                --exposure-us) exposure=$2 ;;
+                --fps) fps=$2 ;;
+                --window) window=$2 ;;
+            esac
+            shift 2
+            ;;
+        --icount) icount=1; shift ;;
+        -*) usage ;;
+        *) [ -z "$clip" ] || usage; clip=$1; shift ;;
+    esac
+done
+[ -n "$clip" ] && [ -n "$line_time" ] || usage
+[ -r "$clip" ] || { echo "run.sh: $clip cannot be read" >&2; exit 1; }
+command -v qemu-system-arm >/dev/null || { echo "run.sh: no qemu-system-arm: apt-get install qemu-system-arm" >&2; exit 1; }
+
+(cd "$root" && tools/embedded-cargo.sh build --quiet --profile firmware -p rowtone-mps2-an505 --bin rowtone-mps2-an505 >&2)
+firmware=$("$root/tools/embedded-cargo.sh" --where firmware rowtone-mps2-an505)
+
+scaled() { awk -v v="$1" -v by="$2" 'BEGIN { printf "%.0f", v * by }'; }
+words="rowtone line_time_ps=$(scaled "$line_time" 1e6) exposure_ns=$(scaled "$exposure" 1e3) window_ms=$(scaled "$window" 1e3)"
+[ -z "$fps" ] || words+=" fps_uhz=$(scaled "$fps" 1e6)"
+words+=" icount=$icount clip=$(realpath "$clip")"
+counting=()
+[ "$icount" = 0 ] || counting=(-icount shift=7)
+exec qemu-system-arm -M mps2-an505 -display none -monitor none -serial stdio "${counting[@]}" \
+    -semihosting-config "enable=on,target=native,arg=${words//,/,,}" -kernel "$firmware" </dev/null
