@@ -4,7 +4,9 @@
 //! The core (package `rowtone`) knows no file, no serial port and no clock; all of that is here:
 //!
 //! - [`commands`]: one file a command, each with its options and what it does;
-//! - [`failure`]: what every command says, and exits with, when it cannot go on.
+//! - [`failure`]: what every command says, and exits with, when it cannot go on;
+//! - [`input`]: videos and the camera options.
 
 pub mod commands;
 pub mod failure;
+pub mod input;

@@ -1,0 +1,126 @@
+//! One frame in memory, handed out as lines.
+
+use rowtone::camera::{Line, Pixels, Timing};
+
+use super::{Header, Rect, Turn};
+
+/// One frame, in buffers that are used again for a later one.
+#[derive(Debug, Default)]
+pub struct Frame {
+    /// Number of the frame; a lost one leaves a gap.
+    pub number: u32,
+    /// Start of exposure of its first row, ns.
+    pub start_ns: i64,
+    /// As read: the marker, then the planes.
+    pub(super) raw: Vec<u8>,
+    /// First byte of the luma plane in `raw`.
+    luma: usize,
+    width: usize,
+    plane: Plane,
+    turned: Vec<u8>,
+    words: Vec<u16>,
+    straight: Vec<u16>,
+}
+
+/// Which buffer holds the luma that is handed out.
+#[derive(Clone, Copy, Debug, Default)]
+enum Plane {
+    #[default]
+    Raw,
+    Turned,
+    Words,
+}
+
+impl Frame {
+    /// Makes the luma plane, which starts at byte `luma` of what was read, ready to be handed out.
+    /// 8-bit luma that need not be turned stays where it is.
+    pub(super) fn prepare(&mut self, header: &Header, luma: usize, turn: Turn) {
+        let (width, height) = (header.width, header.height);
+        self.luma = luma;
+        self.width = turn.size(width, height).0;
+        let values = width * height;
+        if header.format.bits > 8 {
+            let bytes = &self.raw[luma..luma + 2 * values];
+            self.straight.clear();
+            self.straight.extend(
+                bytes
+                    .chunks_exact(2)
+                    .map(|pair| u16::from_le_bytes([pair[0], pair[1]])),
+            );
+            match turn {
+                Turn::No => std::mem::swap(&mut self.straight, &mut self.words),
+                turn => turn.plane(&self.straight, width, height, &mut self.words),
+            }
+            self.plane = Plane::Words;
+        } else if turn == Turn::No {
+            self.plane = Plane::Raw;
+        } else {
+            let from = &self.raw[luma..luma + values];
+            turn.plane(from, width, height, &mut self.turned);
+            self.plane = Plane::Turned;
+        }
+    }
+
+    /// Row `row` of a part of the (turned) picture. The part must lie inside it.
+    pub fn pixels(&self, part: &Rect, row: usize) -> Pixels<'_> {
+        let start = (part.y + row) * self.width + part.x;
+        let range = start..start + part.width;
+        match self.plane {
+            Plane::Raw => Pixels::U8(&self.raw[self.luma..][range]),
+            Plane::Turned => Pixels::U8(&self.turned[range]),
+            Plane::Words => Pixels::U16(&self.words[range]),
+        }
+    }
+
+    /// The lines of a part of the picture, from its top, numbered from 0. `timing` is the whole
+    /// picture's: a row's time depends on where it is in the picture.
+    pub fn lines<'a>(
+        &'a self,
+        part: &'a Rect,
+        timing: &'a Timing,
+    ) -> impl Iterator<Item = Line<'a>> {
+        (0..part.height).map(move |row| Line {
+            frame: self.number,
+            row: row as u16,
+            start_ns: self.start_ns + timing.start_ns((part.y + row) as u16),
+            pixels: self.pixels(part, row),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_of_a_part_know_their_time_in_the_picture() {
+        let header = Header::parse(b"YUV4MPEG2 W3 H3 Cmono").unwrap();
+        let mut frame = Frame {
+            number: 7,
+            start_ns: 100,
+            raw: b"FRAME\nabcdefghi".to_vec(),
+            ..Frame::default()
+        };
+        frame.prepare(&header, 6, Turn::No);
+        let timing = Timing::new(10_000, 0, 3).unwrap();
+        let part = "1,1,2,2".parse().unwrap();
+        let lines: Vec<_> = frame.lines(&part, &timing).collect();
+        assert_eq!(lines.len(), 2);
+        assert_eq!(lines[0].pixels, Pixels::U8(b"ef"));
+        assert_eq!((lines[1].row, lines[1].start_ns), (1, 120));
+    }
+
+    #[test]
+    fn deep_pixels_are_little_endian_words_and_can_be_turned() {
+        let header = Header::parse(b"YUV4MPEG2 W2 H1 Cmono10").unwrap();
+        let mut frame = Frame {
+            raw: b"FRAME\n\x01\x02\xff\x03".to_vec(),
+            ..Frame::default()
+        };
+        frame.prepare(&header, 6, Turn::No);
+        let whole = Rect::whole(2, 1);
+        assert_eq!(frame.pixels(&whole, 0), Pixels::U16(&[0x201, 0x3ff]));
+        frame.prepare(&header, 6, Turn::Quarter);
+        assert_eq!(frame.pixels(&Rect::whole(1, 2), 1), Pixels::U16(&[0x3ff]));
+    }
+}

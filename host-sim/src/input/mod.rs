@@ -1,0 +1,23 @@
+//! Videos in: Y4M files and standard input as frames of lines, with the camera options that every
+//! command shares.
+//!
+//! [`CameraArgs`] are the options; [`Feed::open`] checks them against the file and starts reading;
+//! [`Feed::next_frame`] delivers [`Frame`]s, and a frame hands out the core's lines.
+
+mod calibration;
+mod clock;
+mod feed;
+mod frame;
+mod options;
+mod part;
+mod pixel_format;
+pub mod pts;
+pub mod y4m;
+
+pub use clock::{Clock, Times};
+pub use feed::Feed;
+pub use frame::Frame;
+pub use options::{Camera, CameraArgs};
+pub use part::{Rect, Roi, Turn};
+pub use pixel_format::PixelFormat;
+pub use y4m::Header;
