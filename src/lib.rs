@@ -12,3 +12,4 @@ pub mod reference;
 pub mod report;
 pub mod timeline;
 pub mod tracker;
+pub mod wire;

@@ -1,0 +1,24 @@
+//! A report as bytes on a serial line, and back.
+//!
+//! Everything a board says is a [`Message`]; every wire carries the same messages:
+//!
+//! | wire | one message is | for |
+//! | --- | --- | --- |
+//! | [`text`] | one line of printable ASCII, `$RT…*` and a CRC-32 | people, scripts (default) |
+//!
+//! Both directions are here, so what can be written can be read, and what is read has passed its
+//! checksum *and* every range check. Nothing allocates: encoders write into what the caller
+//! lends, decoders take bytes as they come and keep at most one message. `docs/wire.md` says
+//! the same precisely enough to write a decoder in another language.
+
+mod check;
+mod decimal;
+mod message;
+mod sequence;
+mod slice;
+pub mod text;
+
+pub use check::{EncodeError, MAX_VALUE, check_report};
+pub use message::{Message, REPLY_LEN, Reply, SettingsOrigin, Status};
+pub use sequence::{Arrival, Sequence};
+pub use slice::SliceWriter;
