@@ -12,7 +12,7 @@ use crate::{
     kernel::Kernel,
     noise::{NoiseMeter, PixelNoise},
     pixel::Pixel,
-    reference::{Recipe, RowTable},
+    reference::{Build, Parts, Recipe, RowTable},
     timeline::Displacement,
 };
 use core::{fmt, ops::Range};
@@ -67,7 +67,7 @@ pub struct Storage<'a> {
     pub learning: &'a mut [RowLearning],
     /// width: weight of each column, 0 = unused … 255. As given it is kept: a caller can mask columns.
     pub mask: &'a mut [u8],
-    /// width: scratch.
+    /// 2 × width: scratch.
     pub scratch: &'a mut [f32],
 }
 
@@ -214,7 +214,7 @@ impl<'a> Tracker<'a> {
             ("mean", storage.mean.len(), pixels),
             ("learning", storage.learning.len(), rows),
             ("mask", storage.mask.len(), width),
-            ("scratch", storage.scratch.len(), width),
+            ("scratch", storage.scratch.len(), 2 * width),
         ] {
             if has < needs {
                 return Err(ConfigError::Buffer { name, has, needs });
@@ -235,6 +235,7 @@ impl<'a> Tracker<'a> {
                 },
                 counts_per_value: 32768.0 / values,
                 saturation: values * (254.0 / 256.0),
+                kernel: config.kernel,
             },
             stage: Stage::Rough,
             frame: None,
@@ -472,9 +473,12 @@ impl<'a> Tracker<'a> {
             return;
         };
         let frames = f32::from(learning.frames.max(1));
-        *table = self
-            .recipe
-            .build(mean, frames, s.mask, s.scratch, coefficients);
+        *table = Build::new(&self.recipe, frames).all(&mut Parts {
+            mean,
+            mask: s.mask,
+            scratch: s.scratch,
+            coefficients,
+        });
     }
 
     fn build_all(&mut self) {

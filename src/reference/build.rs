@@ -1,0 +1,447 @@
+//! From a row of the reference to its coefficients, some columns at a time.
+//!
+//! A board must not spend a whole row's work in one line time, so the work is a small state machine:
+//! [`Build::advance`] does the next few columns of the present step. On a desktop one call does all.
+
+use super::RowTable;
+use crate::{
+    band::{Level, MAX_HALF},
+    kernel::{Kernel, MAX_COEFFICIENT},
+    noise::PixelNoise,
+};
+use core::ops::Range;
+
+/// How rows become coefficients: the same for all rows of a picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Recipe {
+    /// How coarse the band is.
+    pub level: Level,
+    /// Pixels from one to the next of the same colour: 1, or 2 for raw Bayer.
+    pub stride: usize,
+    /// Columns at either edge that the motion may carry out of the picture, px.
+    pub margin_px: usize,
+    /// Noise of one pixel.
+    pub noise: PixelNoise,
+    /// Reference counts in one pixel value.
+    pub counts_per_value: f32,
+    /// Pixel value from which on a pixel is saturated.
+    pub saturation: f32,
+    /// Which implementation of the inner product.
+    pub kernel: Kernel,
+}
+
+/// Rows whose shift is less sure than this are not used, px.
+const WORST_SD_PX: f32 = 0.4;
+
+/// Columns on either side over which the energy of the slope is averaged.
+const ENERGY_REACH: usize = 4;
+
+/// The buffers of one row, all of its width.
+#[derive(Debug)]
+pub struct Parts<'a> {
+    /// The reference row, in counts.
+    pub mean: &'a [u16],
+    /// Weight of each column, 0 = unused.
+    pub mask: &'a [u8],
+    /// Scratch, kept from one call of [`Build::advance`] to the next: weights, then h.
+    pub scratch: &'a mut [f32],
+    /// What is built.
+    pub coefficients: &'a mut [i8],
+}
+
+/// Which step comes next.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Step {
+    Weigh,
+    Derive,
+    DropNoise,
+    Balance,
+    Orthogonalise,
+    Quantise,
+    Settle,
+}
+
+/// The work on one row, begun and not yet ended.
+#[derive(Clone, Copy, Debug)]
+pub struct Build {
+    recipe: Recipe,
+    /// How many frames the reference is the mean of.
+    frames: f32,
+    step: Step,
+    column: usize,
+    /// Σ r, in counts.
+    total: u64,
+    /// Squares of the last columns of h as they were, oldest first.
+    before: [f32; ENERGY_REACH],
+    sums: Moments,
+    /// h ← h − w·(α + β·r).
+    alpha_beta: (f32, f32),
+    largest: f32,
+    carry: f32,
+    /// Σ of the coefficients so far.
+    excess: i32,
+    /// Σ h²·variance and Σ w·variance.
+    noise_power: f32,
+    weight_power: f32,
+}
+
+/// Weighted moments of the reference and of h.
+#[derive(Clone, Copy, Debug, Default)]
+struct Moments {
+    w: f32,
+    wr: f32,
+    wrr: f32,
+    h: f32,
+    hr: f32,
+}
+
+impl Moments {
+    /// α and β that make h − w·(α + β·r) orthogonal to 1 and r.
+    fn solve(&self) -> (f32, f32) {
+        let determinant = self.w * self.wrr - self.wr * self.wr;
+        if determinant > 1e-3 * self.w * self.wrr {
+            (
+                (self.h * self.wrr - self.hr * self.wr) / determinant,
+                (self.hr * self.w - self.h * self.wr) / determinant,
+            )
+        } else if self.w > 0.0 {
+            (self.h / self.w, 0.0)
+        } else {
+            (0.0, 0.0)
+        }
+    }
+}
+
+impl Build {
+    /// Begins a row. `frames`: how many frames its mean is the mean of, at least 1.
+    pub fn new(recipe: &Recipe, frames: f32) -> Self {
+        Self {
+            recipe: *recipe,
+            frames: frames.max(1.0),
+            step: Step::Weigh,
+            column: 0,
+            total: 0,
+            before: [0.0; ENERGY_REACH],
+            sums: Moments::default(),
+            alpha_beta: (0.0, 0.0),
+            largest: 0.0,
+            carry: 0.0,
+            excess: 0,
+            noise_power: 0.0,
+            weight_power: 0.0,
+        }
+    }
+
+    /// Builds a row in one go.
+    pub fn all(mut self, parts: &mut Parts<'_>) -> RowTable {
+        loop {
+            if let Some(table) = self.advance(usize::MAX, parts) {
+                return table;
+            }
+        }
+    }
+
+    /// Does the next `columns` columns of the present step; the row's table when the last step is done.
+    /// The coefficients are overwritten on the way: the row must not be measured before its table is
+    /// there. Buffers of the wrong size make a table without texture.
+    pub fn advance(&mut self, columns: usize, parts: &mut Parts<'_>) -> Option<RowTable> {
+        let width = parts.mean.len();
+        let fits = parts.mask.len() == width
+            && parts.scratch.len() == 2 * width
+            && parts.coefficients.len() == width;
+        if !fits {
+            return Some(RowTable::default());
+        }
+        let span = self.column..self.column.saturating_add(columns.max(1)).min(width);
+        self.column = span.end;
+        let ended = span.end == width;
+        let (w, h) = parts.scratch.split_at_mut(width);
+        let next = match self.step {
+            Step::Weigh => {
+                self.weigh(span, parts.mean, parts.mask, w);
+                Step::Derive
+            }
+            Step::Derive => {
+                self.derive(span, parts.mean, w, h);
+                Step::DropNoise
+            }
+            Step::DropNoise => {
+                self.drop_noise(span, parts.mean, w, h);
+                Step::Balance
+            }
+            Step::Balance => {
+                self.balance(span, parts.mean, w, h);
+                if ended {
+                    self.alpha_beta = self.sums.solve();
+                }
+                Step::Orthogonalise
+            }
+            Step::Orthogonalise => {
+                self.orthogonalise(span, parts.mean, w, h);
+                Step::Quantise
+            }
+            Step::Quantise => {
+                self.quantise(span, parts.mean, w, h, parts.coefficients);
+                Step::Settle
+            }
+            Step::Settle => return Some(self.settle(parts.mean, parts.coefficients)),
+        };
+        if ended {
+            self.step = next;
+            self.column = 0;
+        }
+        None
+    }
+
+    fn value(&self, count: u16) -> f32 {
+        f32::from(count) / self.recipe.counts_per_value
+    }
+
+    /// Mean of the row so far: r is taken against it, for the sake of single precision.
+    fn centre(&self, width: usize) -> f32 {
+        self.total as f32 / width.max(1) as f32 / self.recipe.counts_per_value
+    }
+
+    /// w: a column's mask times the inverse variance of its pixel; 0 beyond the margin, beside a masked
+    /// column, and where the pixel is saturated.
+    fn weigh(&mut self, span: Range<usize>, mean: &[u16], mask: &[u8], w: &mut [f32]) {
+        let r = self.recipe;
+        let reach = r.level.half_filter().len() * r.stride;
+        let edge = r.margin_px + MAX_HALF * r.stride;
+        for x in span {
+            let (Some(w), Some(&count)) = (w.get_mut(x), mean.get(x)) else {
+                return;
+            };
+            self.total += u64::from(count);
+            *w = 0.0;
+            let value = self.value(count);
+            let from_edge = x.min(mean.len() - 1 - x);
+            if value >= r.saturation || from_edge < reach {
+                continue;
+            }
+            let near = mask.get(x - reach..=x + reach).unwrap_or(&[]);
+            let mask = near.iter().copied().min().unwrap_or(0);
+            // A soft edge over four pixels, so that a picture moving past it changes little at a time.
+            let ramp = match r.margin_px {
+                0 => 1.0,
+                _ => (from_edge + 4).saturating_sub(edge).min(4) as f32 / 4.0,
+            };
+            *w = ramp * f32::from(mask) / 255.0 / r.noise.variance(value);
+        }
+    }
+
+    /// h ← −w · band-passed r'.
+    fn derive(&self, span: Range<usize>, mean: &[u16], w: &[f32], h: &mut [f32]) {
+        let r = self.recipe;
+        let (Some(h), Some(w)) = (h.get_mut(span.clone()), w.get(span.clone())) else {
+            return;
+        };
+        h.fill(0.0);
+        for (k, &f) in (1..).zip(r.level.half_filter()) {
+            let f = -f / r.counts_per_value;
+            let by = k * r.stride;
+            // Where the filter does not fit, w is 0.
+            let inner = span.start.max(by)..span.end.min(mean.len().saturating_sub(by));
+            let (Some(left), Some(right), Some(h)) = (
+                mean.get(inner.start.wrapping_sub(by)..inner.end.wrapping_sub(by)),
+                mean.get(inner.start + by..inner.end + by),
+                h.get_mut(inner.start - span.start..inner.end.saturating_sub(span.start)),
+            ) else {
+                continue;
+            };
+            for ((h, &left), &right) in h.iter_mut().zip(left).zip(right) {
+                *h += f * (f32::from(right) - f32::from(left));
+            }
+        }
+        for (h, &w) in h.iter_mut().zip(w) {
+            *h *= w;
+        }
+    }
+
+    /// Where the reference's slope is no larger than its own noise it says nothing and would only let the
+    /// line's noise in: a Wiener gain by the energy of nine columns.
+    fn drop_noise(&mut self, span: Range<usize>, mean: &[u16], w: &[f32], h: &mut [f32]) {
+        let half = self.recipe.level.half_filter();
+        let filter_power = 2.0 * half.iter().map(|f| f * f).sum::<f32>() / self.frames;
+        let count = (2 * ENERGY_REACH + 1) as f32;
+        for x in span {
+            let ahead = h.get(x..).unwrap_or(&[]);
+            let ahead: f32 = ahead.iter().take(ENERGY_REACH + 1).map(|h| h * h).sum();
+            let energy = (ahead + self.before.iter().sum::<f32>()) / count;
+            let (Some(h), Some(&w), Some(&c)) = (h.get_mut(x), w.get(x), mean.get(x)) else {
+                return;
+            };
+            self.before.rotate_left(1);
+            self.before[ENERGY_REACH - 1] = *h * *h;
+            let variance = self.recipe.noise.variance(self.value(c));
+            let noise = w * w * variance * filter_power;
+            *h *= if energy > 2.0 * noise {
+                1.0 - noise / energy
+            } else {
+                0.0
+            };
+        }
+    }
+
+    fn balance(&mut self, span: Range<usize>, mean: &[u16], w: &[f32], h: &[f32]) {
+        let centre = self.centre(mean.len());
+        let (Some(mean), Some(w), Some(h)) =
+            (mean.get(span.clone()), w.get(span.clone()), h.get(span))
+        else {
+            return;
+        };
+        for ((&h, &w), &count) in h.iter().zip(w).zip(mean) {
+            if h != 0.0 {
+                let r = self.value(count) - centre;
+                self.sums.w += w;
+                self.sums.wr += w * r;
+                self.sums.wrr += w * r * r;
+                self.sums.h += h;
+                self.sums.hr += h * r;
+            }
+        }
+    }
+
+    /// h ← h − w·(α + β·r), so that Σ h = 0 and Σ h·r = 0.
+    fn orthogonalise(&mut self, span: Range<usize>, mean: &[u16], w: &[f32], h: &mut [f32]) {
+        let centre = self.centre(mean.len());
+        let (alpha, beta) = self.alpha_beta;
+        let (Some(mean), Some(w), Some(h)) =
+            (mean.get(span.clone()), w.get(span.clone()), h.get_mut(span))
+        else {
+            return;
+        };
+        for ((h, &w), &count) in h.iter_mut().zip(w).zip(mean) {
+            if *h != 0.0 {
+                *h -=
+                    w * (alpha + beta * (f32::from(count) / self.recipe.counts_per_value - centre));
+            }
+            self.largest = self.largest.max(h.abs());
+        }
+    }
+
+    /// h scaled to whole numbers. Each rounding error is carried on to the next pixel, which keeps the
+    /// errors out of the texture's band.
+    fn quantise(
+        &mut self,
+        span: Range<usize>,
+        mean: &[u16],
+        w: &[f32],
+        h: &[f32],
+        coefficients: &mut [i8],
+    ) {
+        let limit = f32::from(MAX_COEFFICIENT - 1);
+        let scale = if self.largest > 0.0 && self.largest.is_finite() {
+            limit / self.largest
+        } else {
+            0.0
+        };
+        let (Some(mean), Some(w), Some(h), Some(coefficients)) = (
+            mean.get(span.clone()),
+            w.get(span.clone()),
+            h.get(span.clone()),
+            coefficients.get_mut(span),
+        ) else {
+            return;
+        };
+        for (((c, &h), &w), &count) in coefficients.iter_mut().zip(h).zip(w).zip(mean) {
+            *c = 0;
+            if h == 0.0 {
+                continue;
+            }
+            let wanted = h * scale + self.carry;
+            // Half away from zero, without a call: the value is within ±64.
+            let whole = (wanted + 0.5f32.copysign(wanted)).clamp(-limit, limit) as i8;
+            self.carry = (wanted - f32::from(whole)).clamp(-1.0, 1.0);
+            *c = whole;
+            self.excess += i32::from(whole);
+            let variance = self.recipe.noise.variance(self.value(count));
+            self.noise_power += f32::from(whole) * f32::from(whole) * variance;
+            self.weight_power += w * variance * scale;
+        }
+    }
+
+    /// Makes Σ = 0 exact and fills the table from the row's phase-correlation function q at whole shifts.
+    fn settle(&mut self, mean: &[u16], coefficients: &mut [i8]) -> RowTable {
+        let mut table = RowTable {
+            pixel_sum: self.total as f32 / self.recipe.counts_per_value,
+            ..RowTable::default()
+        };
+        for c in coefficients.iter_mut() {
+            if self.excess == 0 {
+                break;
+            }
+            if *c != 0 && c.abs() < MAX_COEFFICIENT {
+                let step = self.excess.signum();
+                *c -= step as i8;
+                self.excess -= step;
+            }
+        }
+        if self.excess != 0 || self.noise_power <= 0.0 {
+            coefficients.fill(0);
+            return table;
+        }
+        let mut q = [0.0f32; 7];
+        for (lag, q) in (-3isize..).zip(&mut q) {
+            *q = self.correlation(mean, coefficients, lag) / self.recipe.counts_per_value;
+        }
+        // The reference's noise stands in h too, where it looks like texture: E Σ h(x)·n(x − k) is
+        // ±f[k] times the noise, known, and taken off.
+        for (k, &f) in (1usize..=3).zip(self.recipe.level.half_filter()) {
+            let noise = f * self.weight_power / self.frames;
+            q[3 + k] -= noise;
+            q[3 - k] += noise;
+        }
+        let [q_3, q_2, q_1, q0, q1, q2, q3] = q;
+        let stride = self.recipe.stride as f32;
+        let slope = (45.0 * (q1 - q_1) - 9.0 * (q2 - q_2) + (q3 - q_3)) / (60.0 * stride);
+        let information = slope * slope / self.noise_power;
+        // The reference's own noise makes slopes of about sqrt(Σ h²σ²/frames).
+        let chance = libm::sqrtf(self.noise_power / self.frames) * 3.0;
+        let sure = slope > chance && information * WORST_SD_PX * WORST_SD_PX >= 1.0;
+        if !sure || !information.is_finite() {
+            return table;
+        }
+        // Half-way between whole shifts by six-point interpolation; the inverse goes through both.
+        let half = |v: [f32; 6]| {
+            let [a, b, c, d, e, f] = v;
+            (3.0 * (a + f) - 25.0 * (b + e) + 150.0 * (c + d)) / 256.0
+        };
+        let right = (half([q_2, q_1, q0, q1, q2, q3]) - q0) / slope;
+        let left = (half([q_3, q_2, q_1, q0, q1, q2]) - q0) / slope;
+        // ± stride/2 = u + A·u² + B·u³ at both.
+        let (a, b) = if right > 0.0 && left < 0.0 {
+            let right_error = (0.5 * stride - right) / (right * right);
+            let left_error = (-0.5 * stride - left) / (left * left);
+            let b = (right_error - left_error) / (right - left);
+            (right_error - b * right, b)
+        } else {
+            (0.0, 0.0)
+        };
+        table.px_per_product = 1.0 / slope;
+        table.offset_px = q0 / slope;
+        table.quadratic = rounded(a * 256.0);
+        table.cubic = rounded(b * 64.0);
+        table.information = (information.to_bits() >> 16) as u16;
+        table
+    }
+
+    /// Σ h(x)·r(x − lag·stride), in counts.
+    fn correlation(&self, mean: &[u16], coefficients: &[i8], lag: isize) -> f32 {
+        let by = lag.unsigned_abs() * self.recipe.stride;
+        let rest = mean.len().saturating_sub(by);
+        let (mean, coefficients) = if lag >= 0 {
+            (mean.get(..rest), coefficients.get(by..))
+        } else {
+            (mean.get(by..), coefficients.get(..rest))
+        };
+        let (Some(mean), Some(coefficients)) = (mean, coefficients) else {
+            return 0.0;
+        };
+        self.recipe.kernel.sums_u16(mean, coefficients).product as f32
+    }
+}
+
+fn rounded(v: f32) -> i8 {
+    libm::roundf(v).clamp(-127.0, 127.0) as i8
+}
