@@ -5,8 +5,10 @@
 //!
 //! - [`commands`]: one file a command, each with its options and what it does;
 //! - [`failure`]: what every command says, and exits with, when it cannot go on;
-//! - [`input`]: videos and the camera options.
+//! - [`input`]: videos and the camera options;
+//! - [`output`]: reports, displacements and pictures.
 
 pub mod commands;
 pub mod failure;
 pub mod input;
+pub mod output;
