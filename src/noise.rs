@@ -13,6 +13,14 @@ pub struct PixelNoise {
 }
 
 impl PixelNoise {
+    /// Before it was measured: 1/128 of the range of `values`.
+    pub(crate) fn guess(values: f32) -> Self {
+        Self {
+            dark: (values / 128.0) * (values / 128.0),
+            per_value: 0.0,
+        }
+    }
+
     /// Variance of a pixel of this value; never below that of quantisation, 1/12.
     pub fn variance(&self, value: f32) -> f32 {
         (self.dark + self.per_value * value.max(0.0)).max(1.0 / 12.0)

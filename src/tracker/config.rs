@@ -1,0 +1,154 @@
+//! How a tracker is to work, and the memory that it is lent.
+
+use super::RowLearning;
+use crate::{band::Level, camera::Timing, kernel::Kernel, reference::RowTable};
+use core::fmt;
+
+/// How a tracker is to work. Plain data, checked by [`Tracker::new`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Config {
+    /// When rows are exposed.
+    pub timing: Timing,
+    /// Pixels in a line, 16 to 8192.
+    pub width: u16,
+    /// Rows, 1 to [`Timing::rows`].
+    pub rows: u16,
+    /// Bits of a pixel, 8 to 16.
+    pub bits: u8,
+    /// Pixels from one to the next of the same colour: 1 for luma, 2 for raw Bayer.
+    pub stride: u8,
+    /// Frames in each of the two rounds of learning, at least 1.
+    pub learn_frames: u16,
+    /// How coarse the band is; `None` chooses by the information that the picture holds.
+    pub level: Option<Level>,
+    /// How far a lost picture is searched for, px either way; at most a third of the width counts.
+    pub search_px: u16,
+    /// Columns of coefficients that are built anew in one line time: what a line may cost beside its own
+    /// measurement.
+    pub columns_per_line: u16,
+    /// Which implementation of the inner product.
+    pub kernel: Kernel,
+}
+
+impl Config {
+    /// 8-bit luma of this width, all rows of the timing, everything else as it suits most cameras.
+    pub fn new(timing: Timing, width: u16) -> Self {
+        Self {
+            timing,
+            width,
+            rows: timing.rows(),
+            bits: 8,
+            stride: 1,
+            learn_frames: 30,
+            level: None,
+            search_px: 48,
+            columns_per_line: u16::MAX,
+            kernel: Kernel::detect(),
+        }
+    }
+}
+
+/// Memory of a tracker, lent by the caller: 3·width + 24 bytes a row, and 10 bytes a column. The line
+/// path itself reads width + 16 bytes a row.
+#[derive(Debug)]
+pub struct Storage<'a> {
+    /// width × rows: the coefficients of the inner products.
+    pub coefficients: &'a mut [i8],
+    /// rows: what the line path needs besides.
+    pub tables: &'a mut [RowTable],
+    /// width × rows: the reference picture, in counts.
+    pub mean: &'a mut [u16],
+    /// rows: what learning needs.
+    pub learning: &'a mut [RowLearning],
+    /// width: weight of each column, 0 = unused … 255. Kept as given, but for dead columns, which are
+    /// masked.
+    pub mask: &'a mut [u8],
+    /// width: which columns were seen to change.
+    pub activity: &'a mut [u8],
+    /// 2 × width: scratch of building coefficients.
+    pub scratch: &'a mut [f32],
+}
+
+/// Why a [`Config`] or [`Storage`] was refused.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ConfigError {
+    /// Width in pixels, outside 16 to 8192.
+    Width(u16),
+    /// Rows: 0, or more than the timing's.
+    Rows(u16),
+    /// Bits of a pixel, outside 8 to 16.
+    Bits(u8),
+    /// Neither 1 nor 2.
+    Stride(u8),
+    /// Learning needs a frame.
+    LearnFrames,
+    /// A buffer of this name has `has` elements and needs `needs`.
+    Buffer {
+        /// Field of [`Storage`].
+        name: &'static str,
+        /// Its length.
+        has: usize,
+        /// The length that is needed.
+        needs: usize,
+    },
+}
+
+impl fmt::Display for ConfigError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Width(w) => write!(f, "a line of {w} px: 16 to 8192 px can be measured"),
+            Self::Rows(r) => write!(f, "{r} rows: at least 1, at most the camera's"),
+            Self::Bits(b) => write!(f, "{b} bits a pixel: 8 to 16 can be read"),
+            Self::Stride(s) => write!(f, "stride {s}: 1 for luma, 2 for raw Bayer"),
+            Self::LearnFrames => f.write_str("learn_frames is 0: at least 1 frame is needed"),
+            Self::Buffer { name, has, needs } => {
+                write!(f, "buffer `{name}` has {has} elements and needs {needs}")
+            }
+        }
+    }
+}
+
+impl core::error::Error for ConfigError {}
+
+impl Config {
+    /// Checks the configuration and cuts the buffers to the sizes that it needs.
+    pub(super) fn check<'a>(&self, storage: Storage<'a>) -> Result<Storage<'a>, ConfigError> {
+        if !(16..=8192).contains(&self.width) {
+            return Err(ConfigError::Width(self.width));
+        }
+        if self.rows == 0 || self.rows > self.timing.rows() {
+            return Err(ConfigError::Rows(self.rows));
+        }
+        if !(8..=16).contains(&self.bits) {
+            return Err(ConfigError::Bits(self.bits));
+        }
+        if !(1..=2).contains(&self.stride) {
+            return Err(ConfigError::Stride(self.stride));
+        }
+        if self.learn_frames == 0 {
+            return Err(ConfigError::LearnFrames);
+        }
+        let (width, rows) = (usize::from(self.width), usize::from(self.rows));
+        let pixels = width * rows;
+        Ok(Storage {
+            coefficients: cut("coefficients", storage.coefficients, pixels)?,
+            tables: cut("tables", storage.tables, rows)?,
+            mean: cut("mean", storage.mean, pixels)?,
+            learning: cut("learning", storage.learning, rows)?,
+            mask: cut("mask", storage.mask, width)?,
+            activity: cut("activity", storage.activity, width)?,
+            scratch: cut("scratch", storage.scratch, 2 * width)?,
+        })
+    }
+}
+
+fn cut<'a, T>(
+    name: &'static str,
+    buffer: &'a mut [T],
+    needs: usize,
+) -> Result<&'a mut [T], ConfigError> {
+    let has = buffer.len();
+    buffer
+        .get_mut(..needs)
+        .ok_or(ConfigError::Buffer { name, has, needs })
+}

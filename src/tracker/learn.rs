@@ -1,0 +1,245 @@
+//! Learning the reference, in two rounds of frames.
+
+use super::{Found, Stage, Tracker, follow::Follow, predict::Prediction, watch::Watch};
+use crate::{
+    align, band::Level, noise::NoiseMeter, noise::PixelNoise, pixel::Pixel, reference::RowTable,
+};
+
+/// What learning keeps of a row.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct RowLearning {
+    /// Mean shift of the frames of the first round, px: the middle of the motion.
+    pub(super) shift_px: f32,
+    /// Frames that the reference is the mean of.
+    pub(super) frames: u16,
+}
+
+impl RowLearning {
+    pub(super) fn frames(&self) -> u16 {
+        self.frames.max(1)
+    }
+}
+
+/// A row that knows its shift no better than this is aligned like its neighbours, 1/px².
+const OWN_INFORMATION_PER_PX2: f32 = 25.0;
+
+/// While tracking, the reference forgets over so many frames of a row.
+const MEMORY_FRAMES: u16 = 64;
+
+/// Rows on which the levels of the band are tried.
+const TRIAL_ROWS: usize = 24;
+
+/// Motion below this stays within the rows' polynomials, px.
+const SMALL_MOTION_PX: f32 = 0.6;
+
+impl Tracker<'_> {
+    /// Forgets the reference and learns it anew from the next line on. Counters go on.
+    pub fn relearn(&mut self) {
+        let values = 32768.0 / self.recipe.counts_per_value;
+        self.stage = Stage::Rough;
+        self.frame = None;
+        self.frames_in_stage = 0;
+        self.range_px = 0.0;
+        self.gain = 1.0;
+        self.prediction = Prediction::default();
+        self.meter = NoiseMeter::default();
+        self.watch = Watch::default();
+        self.follow = Follow::default();
+        self.recipe.noise = PixelNoise::guess(values);
+        self.recipe.level = self.config.level.unwrap_or(Level::Medium);
+        self.recipe.margin_px = usize::from((self.config.width / 8).min(self.config.search_px));
+        self.storage.learning.fill(RowLearning::default());
+        self.storage.tables.fill(RowTable::default());
+        self.storage.coefficients.fill(0);
+        self.storage.activity.fill(0);
+    }
+
+    /// Ends the present round of learning now, with the frames that were seen: for a recording that is
+    /// shorter than the configured rounds. Nothing happens while tracking.
+    pub fn end_round(&mut self) {
+        match self.stage {
+            Stage::Rough => {
+                self.settle_noise();
+                self.mask_dead_columns();
+                self.settle_margin();
+                if self.config.level.is_none() {
+                    self.choose_level();
+                }
+                self.build_all();
+                for l in self.storage.learning.iter_mut() {
+                    l.frames = 0;
+                }
+                self.stage = Stage::Refining;
+            }
+            Stage::Refining => {
+                self.settle_noise();
+                self.settle_margin();
+                self.build_all();
+                self.stage = Stage::Tracking;
+            }
+            Stage::Tracking => {}
+        }
+        self.prediction = Prediction::default();
+        self.meter = NoiseMeter::default();
+        self.range_px = 0.0;
+        self.frames_in_stage = 0;
+        self.frame = None;
+    }
+
+    /// Aligns a line and averages it into its reference.
+    pub(super) fn learn<P: Pixel>(&mut self, row: usize, pixels: &[P]) {
+        let first = self.frames_in_stage <= 1 && self.stage == Stage::Rough;
+        let mut shift_px = 0.0;
+        if !first {
+            shift_px = match self.locate(row, pixels) {
+                Found::At {
+                    shift_px,
+                    information_per_px2,
+                } if information_per_px2 > OWN_INFORMATION_PER_PX2 => shift_px,
+                Found::At { .. } | Found::NoTexture => self.prediction.shift_px(),
+                Found::Disturbed => return,
+            };
+        }
+        let Some(&seen) = self.storage.learning.get(row) else {
+            return;
+        };
+        let centre = match self.stage {
+            Stage::Rough => 0.0,
+            Stage::Refining | Stage::Tracking => seen.shift_px,
+        };
+        if self.prediction.is_sure() {
+            let from_centre = self.prediction.shift_px() - centre;
+            self.range_px = self.range_px.max(from_centre.abs());
+        }
+        self.measure_noise(row, pixels, shift_px - centre, seen.frames);
+        self.average(row, pixels, shift_px - centre, u16::MAX);
+        if self.stage == Stage::Rough {
+            let frames = seen.frames.saturating_add(1);
+            if let Some(l) = self.storage.learning.get_mut(row) {
+                l.shift_px += (shift_px - l.shift_px) / f32::from(frames);
+            }
+            // A better reference at once, then ever more rarely: the work must stay small.
+            if matches!(frames, 1 | 4 | 16) {
+                self.build(row);
+            }
+        }
+    }
+
+    /// While tracking: the reference of a row that was looked at and fitted takes a little of it.
+    pub(super) fn follow_row<P: Pixel>(&mut self, row: usize, pixels: &[P], shift_px: f32) {
+        self.average(row, pixels, shift_px, MEMORY_FRAMES);
+        self.begin_build(row);
+    }
+
+    fn average<P: Pixel>(&mut self, row: usize, pixels: &[P], shift_px: f32, memory: u16) {
+        let width = pixels.len();
+        let (Some(mean), Some(learning)) = (
+            self.storage.mean.get_mut(row * width..(row + 1) * width),
+            self.storage.learning.get_mut(row),
+        ) else {
+            return;
+        };
+        learning.frames = learning.frames.saturating_add(1).min(memory);
+        let keep = 1.0 / f32::from(learning.frames);
+        let gain = if self.gain > 0.1 { self.gain } else { 1.0 };
+        align::average_in(mean, pixels, shift_px, keep / gain, keep, &self.recipe);
+    }
+
+    fn measure_noise<P: Pixel>(&mut self, row: usize, pixels: &[P], shift_px: f32, frames: u16) {
+        let width = pixels.len();
+        let Some(mean) = self.storage.mean.get(row * width..(row + 1) * width) else {
+            return;
+        };
+        if frames >= 2 || self.stage == Stage::Rough && frames >= 1 {
+            let frames = f32::from(frames);
+            self.meter
+                .add_line(mean, pixels, shift_px, self.gain, &self.recipe, frames);
+            if row.is_multiple_of(8) {
+                self.note_activity(row, pixels);
+            }
+        }
+    }
+
+    fn settle_noise(&mut self) {
+        if let Some(noise) = self.meter.noise(self.recipe.saturation) {
+            self.recipe.noise = noise;
+        }
+    }
+
+    /// Small motion stays within the polynomial and needs no margin.
+    fn settle_margin(&mut self) {
+        let range = self.range_px.min(f32::from(self.config.width / 3));
+        self.recipe.margin_px = if range < SMALL_MOTION_PX {
+            0
+        } else {
+            (range * 1.25) as usize + 2
+        };
+    }
+
+    /// The level that finds the most information in the picture.
+    fn choose_level(&mut self) {
+        let rows = usize::from(self.config.rows);
+        let step = rows.div_ceil(TRIAL_ROWS).max(1);
+        let mut best = (0.0, Level::Medium);
+        for level in Level::ALL {
+            self.recipe.level = level;
+            let mut information = 0.0;
+            for row in (0..rows).step_by(step) {
+                self.build(row);
+                let table = self.storage.tables.get(row);
+                information += table.map_or(0.0, RowTable::information_per_px2);
+            }
+            if information > best.0 {
+                best = (information, level);
+            }
+        }
+        self.recipe.level = best.1;
+    }
+
+    fn build_all(&mut self) {
+        for row in 0..usize::from(self.config.rows) {
+            self.build(row);
+        }
+    }
+
+    /// A live column is never still: it has noise. What never leaves its mean is dead.
+    fn note_activity<P: Pixel>(&mut self, row: usize, pixels: &[P]) {
+        let width = pixels.len();
+        let Some(mean) = self.storage.mean.get(row * width..(row + 1) * width) else {
+            return;
+        };
+        let value = 1.0 / self.recipe.counts_per_value;
+        for ((&p, &mean), active) in pixels
+            .iter()
+            .zip(mean)
+            .zip(self.storage.activity.iter_mut())
+        {
+            let mean = f32::from(mean) * value;
+            let limit = (0.02 * mean).max(0.75);
+            if (f32::from(p.value()) - mean).abs() > limit {
+                *active = active.saturating_add(1);
+            }
+        }
+    }
+
+    /// Masks columns that never changed while their neighbours did: up to three side by side. (A longer
+    /// run is a part of the picture without noise, a clipped one say, and knows nothing anyway.)
+    fn mask_dead_columns(&mut self) {
+        let active = &self.storage.activity;
+        let dead = |x: usize| active.get(x).is_some_and(|&a| a == 0);
+        let mut x = 0;
+        while x < active.len() {
+            let mut run = 0;
+            while dead(x + run) {
+                run += 1;
+            }
+            let alone = x > 0 && x + run < active.len();
+            if alone && (1..=3).contains(&run) {
+                for mask in self.storage.mask.iter_mut().skip(x).take(run) {
+                    *mask = 0;
+                }
+            }
+            x += run + 1;
+        }
+    }
+}

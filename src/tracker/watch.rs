@@ -1,0 +1,202 @@
+//! Does a line still look like its reference?
+//!
+//! The inner product alone cannot tell a moving surface from a hand in front of it. So now and then, and
+//! whenever a line surprises, what the line leaves over after its shifted reference is taken off is
+//! compared with the pixels' noise and with what an error of the shift would leave. A line that fails is
+//! searched for over the whole range of motion; if it is not found either, it is disturbed, and so are
+//! the following ones until one fits again.
+
+use super::{Stage, Tracker, overlap::Overlap};
+use crate::{pixel::Pixel, reference::RowTable};
+
+/// In tracking one row in this many is looked at even if it does not surprise.
+const EVERY: usize = 16;
+
+/// A scene that does not fit for so long is a new scene, ns.
+const NEW_SCENE_NS: i64 = 1_500_000_000;
+
+/// What the watch remembers.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Watch {
+    /// The last line looked at did not fit: look at every line.
+    disturbed: bool,
+    /// The frame has begun and no line was looked at yet.
+    new_frame: bool,
+    /// Lines to wait before the next search, while nothing fits.
+    rest: u8,
+    /// Lines of this frame that fitted, and that did not.
+    fitted: u32,
+    unfit: u32,
+    /// When the scene stopped to fit.
+    since_ns: Option<i64>,
+    /// What even a good line leaves over, as the square of an error of the shift, px²: a background that
+    /// stands still, a lens that distorts.
+    usual_px2: f32,
+}
+
+impl Watch {
+    #[inline]
+    pub(super) fn is_due(&self, row: usize, frame: Option<u32>) -> bool {
+        let turn = frame.unwrap_or(0) as usize % EVERY;
+        self.disturbed || self.new_frame || row % EVERY == turn
+    }
+
+    pub(super) fn begin_frame(&mut self) {
+        self.new_frame = true;
+        self.rest = 0;
+        self.fitted = 0;
+        self.unfit = 0;
+    }
+
+    /// Closes the frame that ended; the scene has changed for good when this returns true.
+    pub(super) fn end_frame(&mut self, now_ns: i64) -> bool {
+        if self.unfit > 3 * self.fitted && self.unfit > 0 {
+            let since = *self.since_ns.get_or_insert(now_ns);
+            return now_ns.saturating_sub(since) > NEW_SCENE_NS;
+        }
+        self.since_ns = None;
+        false
+    }
+
+    /// Learns what a good line leaves over.
+    fn learn(&mut self, excess_px2: f32) {
+        self.usual_px2 += (excess_px2 - self.usual_px2) / 64.0;
+    }
+}
+
+/// What a line leaves over, per pixel and in units of the pixels' variance.
+struct Rest {
+    /// Mean square of what is left.
+    power: f32,
+    /// Mean square that an error of the shift of 1 px would leave.
+    slope_power: f32,
+}
+
+impl Tracker<'_> {
+    /// Looks whether a line at `shift_px` resembles its reference. Returns its shift, found anew if need
+    /// be, or `None` for a disturbed line.
+    #[cold]
+    pub(super) fn look<P: Pixel>(
+        &mut self,
+        row: usize,
+        table: &RowTable,
+        pixels: &[P],
+        shift_px: f32,
+    ) -> Option<f32> {
+        self.watch.new_frame = false;
+        let mut fit = self.fits(row, pixels, shift_px).then_some(shift_px);
+        if fit.is_none() && self.watch.rest == 0 {
+            self.watch.rest = 8;
+            fit = self
+                .search(row, table, pixels)
+                .and_then(|near| self.correlate(row, table, pixels, near))
+                .filter(|&shift| self.fits(row, pixels, shift));
+        }
+        self.watch.rest = self.watch.rest.saturating_sub(1);
+        self.watch.disturbed = fit.is_none();
+        if fit.is_some() {
+            self.watch.fitted += 1;
+        } else {
+            // The gain is that of something else.
+            self.gain = 1.0;
+            self.watch.unfit += 1;
+        }
+        fit
+    }
+
+    fn fits<P: Pixel>(&mut self, row: usize, pixels: &[P], shift_px: f32) -> bool {
+        let Some(rest) = self.rest(row, pixels, shift_px) else {
+            return false;
+        };
+        // While learning, the reference is still blurred and a still background not yet known.
+        let allowed_px2 = match self.stage {
+            Stage::Tracking => 0.2 + 4.0 * self.watch.usual_px2,
+            Stage::Rough | Stage::Refining => 2.0,
+        };
+        let fits = rest.power <= 5.0 + allowed_px2 * rest.slope_power;
+        if fits && self.stage == Stage::Refining && rest.slope_power > 0.0 {
+            self.watch
+                .learn((rest.power - 2.0).max(0.0) / rest.slope_power);
+        }
+        fits
+    }
+
+    /// What is left of a line when its reference, shifted, is taken off; every fourth column serves.
+    fn rest<P: Pixel>(&self, row: usize, pixels: &[P], shift_px: f32) -> Option<Rest> {
+        let width = pixels.len();
+        let r = &self.recipe;
+        let mean = self.storage.mean.get(row * width..)?.get(..width)?;
+        let frames = f32::from(self.storage.learning.get(row)?.frames.max(1));
+        let stride = r.stride as i32;
+        let whole = super::nearest(shift_px / stride as f32) * stride;
+        let near = shift_px - whole as f32;
+        let overlap = Overlap::new(width, whole)?;
+        let (mean, mask) = (
+            mean.get(overlap.reference.clone())?,
+            self.storage.mask.get(overlap.reference)?,
+        );
+        let line = pixels.get(overlap.line)?;
+        let (value, pitch) = (1.0 / r.counts_per_value, 1.0 / r.stride as f32);
+        let own = 1.0 + 1.0 / frames;
+        let (mut power, mut slopes, mut n) = (0.0f32, 0.0f32, 0.0f32);
+        for ((window, &p), &mask) in mean
+            .windows(2 * r.stride + 1)
+            .zip(line.get(r.stride..)?)
+            .zip(mask.get(r.stride..)?)
+            .step_by(4)
+        {
+            let (Some(&left), Some(&here), Some(&right)) =
+                (window.first(), window.get(r.stride), window.last())
+            else {
+                continue;
+            };
+            let here = f32::from(here) * value;
+            if mask == 0 || here >= r.saturation {
+                continue;
+            }
+            let (left, right) = (f32::from(left) * value, f32::from(right) * value);
+            let slope = 0.5 * (right - left) * pitch;
+            let bend = (right - 2.0 * here + left) * pitch * pitch;
+            let model = here - near * (slope - 0.5 * near * bend);
+            let rest = f32::from(p.value()) - self.gain * model;
+            let weight = 1.0 / (r.noise.variance(here) * own);
+            power += rest * rest * weight;
+            slopes += slope * slope * weight;
+            n += 1.0;
+        }
+        (n >= 4.0).then(|| Rest {
+            power: power / n,
+            slope_power: slopes / n,
+        })
+    }
+
+    /// Where over the whole range a line resembles its reference most (least squares over every second
+    /// column), px.
+    fn search<P: Pixel>(&self, row: usize, table: &RowTable, pixels: &[P]) -> Option<f32> {
+        let width = pixels.len();
+        let mean = self.storage.mean.get(row * width..)?.get(..width)?;
+        let reach = i32::from(self.config.search_px).min(width as i32 / 3);
+        let stride = usize::from(self.config.stride);
+        let line_sum: f32 = pixels.iter().map(|p| f32::from(p.value())).sum();
+        let value = line_sum / table.pixel_sum().max(1.0) / self.recipe.counts_per_value;
+        let mut best: Option<(f32, i32)> = None;
+        for whole in (-reach..=reach).step_by(stride) {
+            let overlap = Overlap::new(width, whole)?;
+            let (line, mean) = (pixels.get(overlap.line)?, mean.get(overlap.reference)?);
+            let power: f32 = line
+                .iter()
+                .zip(mean)
+                .step_by(2)
+                .map(|(&p, &r)| {
+                    let rest = f32::from(p.value()) - value * f32::from(r);
+                    rest * rest
+                })
+                .sum();
+            let power = power / line.len() as f32;
+            if best.is_none_or(|(least, _)| power < least) {
+                best = Some((power, whole));
+            }
+        }
+        best.map(|(_, whole)| whole as f32)
+    }
+}
