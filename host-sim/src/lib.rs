@@ -6,9 +6,11 @@
 //! - [`commands`]: one file a command, each with its options and what it does;
 //! - [`failure`]: what every command says, and exits with, when it cannot go on;
 //! - [`input`]: videos and the camera options;
-//! - [`output`]: reports, displacements and pictures.
+//! - [`output`]: reports, displacements and pictures;
+//! - [`tracking`]: frames to displacements.
 
 pub mod commands;
 pub mod failure;
 pub mod input;
 pub mod output;
+pub mod tracking;

@@ -13,6 +13,7 @@ use clap::{Parser, Subcommand};
 use crate::failure::Failure;
 
 pub mod demo;
+pub mod displacement;
 
 /// Measures vibration with a rolling-shutter camera: every row of a frame is a sample in time.
 #[derive(Debug, Parser)]
@@ -25,14 +26,21 @@ struct Cli {
 
 /// What `rowtone` can do.
 #[derive(Debug, Subcommand)]
+#[expect(
+    clippy::large_enum_variant,
+    reason = "there is one, for as long as the program runs"
+)]
 enum Command {
     /// A simulated camera looks at a simulated machine; its peaks appear beside the truth
     Demo(demo::Args),
+    /// Writes the motion over time as CSV, NPY or WAV
+    Displacement(displacement::Args),
 }
 
 fn run(command: &Command) -> Result<(), Failure> {
     match command {
         Command::Demo(args) => demo::run(args),
+        Command::Displacement(args) => displacement::run(args),
     }
 }
 

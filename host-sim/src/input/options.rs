@@ -89,6 +89,8 @@ pub struct Camera {
     pub timing: Timing,
     /// Usual frame rate, Hz.
     pub fps: f64,
+    /// Bits of a pixel.
+    pub bits: u8,
     /// Columns and rows of the turned picture.
     pub size: (usize, usize),
     /// The part to measure, in the turned picture; `None` leaves the choice to the program.
@@ -102,10 +104,20 @@ pub struct Camera {
 }
 
 impl Camera {
-    /// The part to measure, the whole picture where none was given.
-    pub fn part_or_whole(&self) -> Rect {
-        self.part
-            .unwrap_or_else(|| Rect::whole(self.size.0, self.size.1))
+    /// The part to measure. Where none was given, the whole picture, or with a background the largest
+    /// part beside it.
+    ///
+    /// # Errors
+    /// [`Failure::Usage`] when the background leaves nothing to measure.
+    pub fn part_or_rest(&self) -> Result<Rect, Failure> {
+        let (width, height) = self.size;
+        match (self.part, self.background) {
+            (Some(part), _) => Ok(part),
+            (None, None) => Ok(Rect::whole(width, height)),
+            (None, Some(background)) => background.largest_beside(width, height).ok_or_else(|| {
+                Failure::usage("--background is the whole picture: leave a part that vibrates")
+            }),
+        }
     }
 }
 
@@ -217,6 +229,7 @@ impl CameraArgs {
         Ok(Camera {
             timing,
             fps,
+            bits: header.format.bits,
             size,
             part,
             background,

@@ -33,6 +33,27 @@ impl Rect {
         };
         inside(self.x, self.width, width) && inside(self.y, self.height, height)
     }
+
+    /// The largest rectangle of a picture of this size that is left, right, above or below of this
+    /// one, which must fit. `None` when nothing is left.
+    pub fn largest_beside(&self, width: usize, height: usize) -> Option<Self> {
+        let (right, below) = (self.x + self.width, self.y + self.height);
+        let beside = |x, y, width, height| Self {
+            x,
+            y,
+            width,
+            height,
+        };
+        [
+            beside(0, 0, self.x, height),
+            beside(right, 0, width - right, height),
+            beside(0, 0, width, self.y),
+            beside(0, below, width, height - below),
+        ]
+        .into_iter()
+        .filter(|part| part.width > 0 && part.height > 0)
+        .max_by_key(|part| part.width * part.height)
+    }
 }
 
 impl FromStr for Rect {
@@ -183,6 +204,13 @@ mod tests {
         assert!(!part(3, 1, 3, 2).fits(5, 3));
         assert!(!part(0, 2, 3, 2).fits(5, 3));
         assert!(!part(usize::MAX, 0, 3, 2).fits(5, 3));
+    }
+
+    #[test]
+    fn what_is_left_beside_a_part() {
+        let part: Rect = "0,0,48,240".parse().unwrap();
+        assert_eq!(part.largest_beside(160, 240), "48,0,112,240".parse().ok());
+        assert_eq!(part.largest_beside(48, 240), None);
     }
 
     #[test]

@@ -75,6 +75,11 @@ impl Series {
         }
     }
 
+    /// Rows in each sample.
+    pub fn rows_per_sample(&self) -> usize {
+        self.rows_per_sample
+    }
+
     /// Frames so far.
     pub fn frames(&self) -> usize {
         self.frames_ns.len()

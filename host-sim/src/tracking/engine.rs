@@ -1,0 +1,121 @@
+//! One part of the picture, its tracker and the tracker's memory.
+
+use rowtone::camera::Timing;
+use rowtone::timeline::Displacement;
+use rowtone::tracker::{Config, ConfigError, Outcome, Storage, Tracker};
+
+use crate::failure::Failure;
+use crate::input::{Frame, Rect};
+
+/// Memory that a tracker borrows.
+#[derive(Debug)]
+pub struct Buffers {
+    coefficients: Vec<i8>,
+    tables: Vec<rowtone::reference::RowTable>,
+    mean: Vec<u16>,
+    learning: Vec<rowtone::tracker::RowLearning>,
+    mask: Vec<u8>,
+    scratch: Vec<f32>,
+}
+
+impl Buffers {
+    /// Memory for a part of this size.
+    pub fn new(part: &Rect) -> Self {
+        let pixels = part.width * part.height;
+        Self {
+            coefficients: vec![0; pixels],
+            tables: vec![Default::default(); part.height],
+            mean: vec![0; pixels],
+            learning: vec![Default::default(); part.height],
+            mask: vec![u8::MAX; part.width],
+            scratch: vec![0.0; part.width],
+        }
+    }
+
+    fn storage(&mut self) -> Storage<'_> {
+        Storage {
+            coefficients: &mut self.coefficients,
+            tables: &mut self.tables,
+            mean: &mut self.mean,
+            learning: &mut self.learning,
+            mask: &mut self.mask,
+            scratch: &mut self.scratch,
+        }
+    }
+}
+
+/// How many lines could not be measured, and why.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Unmeasured {
+    /// Rows without enough texture.
+    pub no_texture: u32,
+    /// Rows that something passed through.
+    pub disturbed: u32,
+    /// Rows that came while a reference was being learned anew.
+    pub learning: u32,
+}
+
+/// A tracker on one part of the picture.
+#[derive(Debug)]
+pub struct Engine<'a> {
+    part: Rect,
+    timing: Timing,
+    tracker: Tracker<'a>,
+}
+
+impl<'a> Engine<'a> {
+    /// A tracker on `part` of a picture with this timing and this many bits a pixel.
+    ///
+    /// # Errors
+    /// [`Failure::Input`] when the part cannot be measured; `name` stands in front.
+    pub fn new(
+        part: Rect,
+        timing: Timing,
+        bits: u8,
+        learn_frames: u16,
+        buffers: &'a mut Buffers,
+        name: &str,
+    ) -> Result<Self, Failure> {
+        let refuse = |error: ConfigError| Failure::input(format!("{name}: {error}"));
+        // Sizes beyond u16 were refused with the header.
+        let width = u16::try_from(part.width).unwrap_or(u16::MAX);
+        let config = Config {
+            rows: part.height as u16,
+            bits,
+            learn_frames,
+            ..Config::new(timing, width)
+        };
+        let tracker = Tracker::new(config, buffers.storage()).map_err(refuse)?;
+        Ok(Self {
+            part,
+            timing,
+            tracker,
+        })
+    }
+
+    /// Shows the tracker a frame while it learns.
+    pub fn learn(&mut self, frame: &Frame) {
+        for line in frame.lines(&self.part, &self.timing) {
+            self.tracker.push(&line);
+        }
+    }
+
+    /// Ends a round of learning.
+    pub fn end_round(&mut self) {
+        self.tracker.end_round();
+    }
+
+    /// Measures every line of a frame and appends what came of it to `to`.
+    pub fn measure(&mut self, frame: &Frame, to: &mut Vec<Displacement>) -> Unmeasured {
+        let mut unmeasured = Unmeasured::default();
+        for line in frame.lines(&self.part, &self.timing) {
+            match self.tracker.push(&line) {
+                Outcome::Measured(displacement) => to.push(displacement),
+                Outcome::NoTexture | Outcome::Misfit => unmeasured.no_texture += 1,
+                Outcome::Disturbed => unmeasured.disturbed += 1,
+                Outcome::Learning => unmeasured.learning += 1,
+            }
+        }
+        unmeasured
+    }
+}
