@@ -7,10 +7,12 @@
 //! - [`failure`]: what every command says, and exits with, when it cannot go on;
 //! - [`input`]: videos and the camera options;
 //! - [`output`]: reports, displacements and pictures;
+//! - [`serial`]: serial ports;
 //! - [`tracking`]: frames to displacements.
 
 pub mod commands;
 pub mod failure;
 pub mod input;
 pub mod output;
+pub mod serial;
 pub mod tracking;

@@ -14,6 +14,7 @@ use crate::failure::Failure;
 
 pub mod demo;
 pub mod displacement;
+pub mod monitor;
 
 /// Measures vibration with a rolling-shutter camera: every row of a frame is a sample in time.
 #[derive(Debug, Parser)]
@@ -35,12 +36,15 @@ enum Command {
     Demo(demo::Args),
     /// Writes the motion over time as CSV, NPY or WAV
     Displacement(displacement::Args),
+    /// Decodes what a board sends over a serial port
+    Monitor(monitor::Args),
 }
 
 fn run(command: &Command) -> Result<(), Failure> {
     match command {
         Command::Demo(args) => demo::run(args),
         Command::Displacement(args) => displacement::run(args),
+        Command::Monitor(args) => monitor::run(args),
     }
 }
 
