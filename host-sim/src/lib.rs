@@ -9,6 +9,7 @@
 //! - [`output`]: reports, displacements and pictures;
 //! - [`serial`]: serial ports;
 //! - [`tracking`]: frames to displacements.
+//! - [`sim`]: a simulated rolling-shutter camera, with the truth about what it saw.
 
 pub mod commands;
 pub mod failure;
@@ -16,3 +17,4 @@ pub mod input;
 pub mod output;
 pub mod serial;
 pub mod tracking;
+pub mod sim;

@@ -1,0 +1,406 @@
+//! What the camera looks at: how much light each point reflects.
+
+use std::path::PathBuf;
+
+use rand_distr::{Distribution, StandardNormal};
+use rustfft::num_complex::Complex64;
+use rustfft::{FftDirection, FftPlannerScalar};
+use serde::Serialize;
+
+use super::error::{SimError, check};
+use super::schedule::stream;
+use super::texture::Strip;
+
+/// The kinds of scene.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(tag = "kind", rename_all = "lowercase")]
+#[non_exhaustive]
+pub enum Scene {
+    /// Random specks, as on a sprayed or rough surface.
+    Speckle {
+        /// Size of a speck: standard deviation of the Gaussian that made them, px.
+        grain_px: f64,
+    },
+    /// One bright vertical bar on a dark ground, in the middle.
+    Bar {
+        /// Its width, px.
+        width_px: f64,
+    },
+    /// Bright vertical stripes.
+    Stripes {
+        /// From one to the next, px.
+        period_px: f64,
+    },
+    /// Like a photograph: detail at every size (amplitude falling as 1/frequency), dark and bright
+    /// shapes, and a sky without texture above.
+    Photo {
+        /// Share of the rows that are sky, 0 to 1.
+        sky: f64,
+    },
+    /// An evenly lit wall without texture, to see nothing but the light.
+    Plain,
+    /// A picture file (PNG or JPEG), scaled to the frame's height.
+    Picture {
+        /// The file.
+        path: PathBuf,
+    },
+}
+
+impl Scene {
+    pub(super) fn check(&self) -> Result<(), SimError> {
+        match *self {
+            Self::Speckle { grain_px } => check(
+                (0.0..=200.0).contains(&grain_px),
+                "the grain (px)",
+                grain_px,
+                "0 to 200",
+            ),
+            Self::Bar { width_px } => {
+                check(width_px > 0.0, "the bar's width (px)", width_px, "above 0")
+            }
+            Self::Stripes { period_px } => check(
+                period_px >= 2.0,
+                "the stripes' period (px)",
+                period_px,
+                "2 or more",
+            ),
+            Self::Photo { sky } => check(
+                (0.0..=1.0).contains(&sky),
+                "the share of sky",
+                sky,
+                "0 to 1",
+            ),
+            Self::Plain | Self::Picture { .. } => Ok(()),
+        }
+    }
+
+    /// The scene as a strip of `rows` rows that shows `cols` and has at least `margin_px` more.
+    ///
+    /// # Errors
+    /// [`SimError::File`] when the picture cannot be read.
+    pub fn strip(
+        &self,
+        cols: usize,
+        margin_px: usize,
+        rows: usize,
+        blur_px: f64,
+        seed: u64,
+    ) -> Result<Strip, SimError> {
+        let mut period_px = (cols + margin_px).next_multiple_of(32);
+        Ok(match self {
+            Self::Speckle { grain_px } => speckle(period_px, rows, *grain_px, blur_px, seed),
+            Self::Bar { width_px } => {
+                let middle = cols as f64 * 0.5;
+                let ends = [middle - 0.5 * width_px, middle + 0.5 * width_px];
+                boxes(period_px, rows, |_| vec![ends])
+            }
+            Self::Stripes { period_px: p } => {
+                // A whole number of stripes, so that the strip closes.
+                period_px = (((period_px as f64 / p).ceil() * p).round()) as usize;
+                let count = (period_px as f64 / p).round();
+                let step = period_px as f64 / count;
+                boxes(period_px, rows, |_| {
+                    (0..count as usize)
+                        .map(|k| [(k as f64 + 0.25) * step, (k as f64 + 0.75) * step])
+                        .collect()
+                })
+            }
+            Self::Photo { sky } => photo(period_px, rows, *sky, seed),
+            Self::Plain => Strip {
+                period_px,
+                fineness: 1,
+                values: vec![0.7; period_px * rows],
+            },
+            Self::Picture { path } => picture(path, period_px, rows)?,
+        })
+    }
+}
+
+/// White noise blurred to the grain, pressed into 0 to 1 so that all greys are equally frequent.
+fn speckle(period_px: usize, rows: usize, grain_px: f64, blur_px: f64, seed: u64) -> Strip {
+    let width = period_px * 2;
+    let mut values = noise(width * rows, seed);
+    blur_rows(&mut values, width, 2.0 * grain_px);
+    blur_cols(&mut values, width, grain_px);
+    let n = values.len() as f64;
+    let rms = (values.iter().map(|&v| f64::from(v).powi(2)).sum::<f64>() / n).sqrt();
+    for v in &mut values {
+        *v = (0.5 + 0.5 * libm::erf(f64::from(*v) / (rms * std::f64::consts::SQRT_2))) as f32;
+    }
+    blur_cols(&mut values, width, blur_px);
+    Strip {
+        period_px,
+        fineness: 2,
+        values,
+    }
+}
+
+fn noise(len: usize, seed: u64) -> Vec<f32> {
+    let mut rng = stream(seed, 2, 0);
+    (0..len).map(|_| StandardNormal.sample(&mut rng)).collect()
+}
+
+/// Bright boxes (start, end in px) on a dark ground, drawn with their exact share of each value.
+fn boxes(period_px: usize, rows: usize, in_row: impl Fn(usize) -> Vec<[f64; 2]>) -> Strip {
+    let width = period_px * 2;
+    let mut values = vec![0.0; width * rows];
+    for (y, row) in values.chunks_mut(width).enumerate() {
+        for [start, end] in in_row(y) {
+            for (k, v) in row.iter_mut().enumerate() {
+                // Value k stands for the half pixel around k/2 in the picture's own coordinates.
+                let (left, right) = (0.5 * k as f64 - 0.25, 0.5 * k as f64 + 0.25);
+                *v += (2.0 * (end.min(right) - start.max(left)).max(0.0)) as f32;
+            }
+        }
+    }
+    Strip {
+        period_px,
+        fineness: 2,
+        values,
+    }
+}
+
+/// A 1/f field over the whole strip (2-D Fourier synthesis), a harder-edged version of a second one on
+/// top, and an almost plain sky above a wavy horizon.
+fn photo(period_px: usize, rows: usize, sky: f64, seed: u64) -> Strip {
+    let detail = one_over_f(period_px, rows, 1.0, seed);
+    let shapes = one_over_f(period_px, rows, 1.6, seed ^ 0x5eed);
+    let mut values = vec![0.0; period_px * rows];
+    for (i, v) in values.iter_mut().enumerate() {
+        let (x, y) = (i % period_px, i / period_px);
+        let u = std::f64::consts::TAU * x as f64 / period_px as f64;
+        let horizon = rows as f64
+            * (sky + 0.01 * (libm::sin(3.0 * u) + libm::sin(5.0 * u + 1.0)).min(sky * 50.0));
+        let land = 0.42 + 0.13 * detail[i] + 0.12 * libm::tanh(4.0 * shapes[i]);
+        let above = 0.78 - 0.1 * y as f64 / rows as f64;
+        let ground = ((y as f64 - horizon) + 0.5).clamp(0.0, 1.0);
+        *v = (ground * land + (1.0 - ground) * above).clamp(0.0, 1.0) as f32;
+    }
+    Strip {
+        period_px,
+        fineness: 1,
+        values,
+    }
+}
+
+/// A periodic random field with amplitude 1/f^`power`, mean 0, standard deviation 1.
+fn one_over_f(width: usize, rows: usize, power: f64, seed: u64) -> Vec<f64> {
+    // Twice the height, so that top and bottom are strangers.
+    let height = rows * 2;
+    let mut field: Vec<Complex64> = noise(width * height, seed)
+        .iter()
+        .map(|&v| Complex64::new(f64::from(v), 0.0))
+        .collect();
+    transform(&mut field, width, height, FftDirection::Forward);
+    for (i, c) in field.iter_mut().enumerate() {
+        let turn = |k: usize, n: usize| k.min(n - k) as f64 / n as f64;
+        let (fx, fy) = (turn(i % width, width), turn(i / width, height));
+        let f2 = fx * fx + fy * fy;
+        let gain = if f2 > 0.0 {
+            libm::pow(f2, -0.5 * power)
+        } else {
+            0.0
+        };
+        *c *= gain;
+    }
+    transform(&mut field, width, height, FftDirection::Inverse);
+    let out: Vec<f64> = field.iter().take(width * rows).map(|c| c.re).collect();
+    let n = out.len() as f64;
+    let mean = out.iter().sum::<f64>() / n;
+    let sd = (out.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n)
+        .sqrt()
+        .max(1e-300);
+    out.iter().map(|v| (v - mean) / sd).collect()
+}
+
+/// Fourier transform over rows, then columns, in place.
+fn transform(field: &mut [Complex64], width: usize, height: usize, direction: FftDirection) {
+    let mut planner = FftPlannerScalar::new();
+    planner.plan_fft(width, direction).process(field);
+    let along = planner.plan_fft(height, direction);
+    let mut column = vec![Complex64::default(); height];
+    for x in 0..width {
+        for (c, row) in column.iter_mut().zip(field.chunks(width)) {
+            *c = row[x];
+        }
+        along.process(&mut column);
+        for (c, row) in column.iter().zip(field.chunks_mut(width)) {
+            row[x] = *c;
+        }
+    }
+}
+
+/// A picture scaled to the frame's height; what is missing in width is its mirror image, and the
+/// strip closes by fading its last part into its first.
+fn picture(path: &std::path::Path, period_px: usize, rows: usize) -> Result<Strip, SimError> {
+    let fail = |why: String| SimError::File {
+        path: path.display().to_string(),
+        why,
+    };
+    let reader = image::ImageReader::open(path).map_err(|e| fail(e.to_string()))?;
+    let reader = reader
+        .with_guessed_format()
+        .map_err(|e| fail(e.to_string()))?;
+    let grey = reader
+        .decode()
+        .map_err(|e| fail(e.to_string()))?
+        .into_luma16();
+    let (w, h) = grey.dimensions();
+    if w == 0 || h == 0 {
+        return Err(fail("the picture is empty".into()));
+    }
+    let width = ((f64::from(w) * rows as f64 / f64::from(h)).round() as u32).max(1);
+    let scaled = image::imageops::resize(
+        &grey,
+        width,
+        rows as u32,
+        image::imageops::FilterType::Triangle,
+    );
+    let fade = (period_px / 8).min(64);
+    let at = |x: usize, y: usize| {
+        let turn = 2 * width as usize;
+        let k = x % turn;
+        let k = if k < width as usize { k } else { turn - 1 - k };
+        f32::from(scaled.get_pixel(k as u32, y as u32).0[0]) / 65535.0
+    };
+    let mut values = Vec::with_capacity(period_px * rows);
+    for y in 0..rows {
+        for x in 0..period_px {
+            // The last columns fade into what lies left of the first, itself a mirror image.
+            let into = (x + fade + 1).saturating_sub(period_px) as f32 / (fade + 1) as f32;
+            values.push(at(x, y) * (1.0 - into) + at(period_px - 1 - x, y) * into);
+        }
+    }
+    Ok(Strip {
+        period_px,
+        fineness: 1,
+        values,
+    })
+}
+
+fn gaussian(sigma: f64) -> Vec<f32> {
+    let reach = (4.0 * sigma).ceil() as i64;
+    let weights: Vec<f64> = (-reach..=reach)
+        .map(|k| libm::exp(-0.5 * (k as f64 / sigma).powi(2)))
+        .collect();
+    let sum: f64 = weights.iter().sum();
+    weights.iter().map(|w| (w / sum) as f32).collect()
+}
+
+/// Gaussian blur along each row, around the end.
+fn blur_rows(values: &mut [f32], width: usize, sigma: f64) {
+    if sigma <= 0.0 {
+        return;
+    }
+    let taps = gaussian(sigma);
+    let reach = taps.len() / 2;
+    for row in values.chunks_mut(width) {
+        let source: Vec<f32> = (0..width + 2 * reach)
+            .map(|k| row[(k + width * (reach / width + 1) - reach) % width])
+            .collect();
+        for (v, near) in row.iter_mut().zip(source.windows(taps.len())) {
+            *v = near.iter().zip(&taps).map(|(a, b)| a * b).sum();
+        }
+    }
+}
+
+/// Gaussian blur down the columns; the first and last rows repeat beyond the edge.
+fn blur_cols(values: &mut [f32], width: usize, sigma: f64) {
+    if sigma <= 0.0 {
+        return;
+    }
+    let taps = gaussian(sigma);
+    let reach = taps.len() as i64 / 2;
+    let source = values.to_vec();
+    let last = (source.len() / width) as i64 - 1;
+    for (y, row) in values.chunks_mut(width).enumerate() {
+        row.fill(0.0);
+        for (k, t) in taps.iter().enumerate() {
+            let from = (y as i64 + k as i64 - reach).clamp(0, last) as usize * width;
+            for (v, s) in row.iter_mut().zip(&source[from..from + width]) {
+                *v += t * s;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_scene_fills_its_strip_with_reflectances() {
+        let scenes = [
+            Scene::Speckle { grain_px: 2.0 },
+            Scene::Speckle { grain_px: 0.0 },
+            Scene::Bar { width_px: 40.0 },
+            Scene::Stripes { period_px: 14.3 },
+            Scene::Photo { sky: 0.25 },
+            Scene::Photo { sky: 0.0 },
+            Scene::Plain,
+        ];
+        for scene in scenes {
+            let strip = scene.strip(80, 20, 20, 1.6, 7).expect("no files");
+            assert!(strip.period_px >= 100);
+            assert_eq!(
+                strip.values.len(),
+                strip.period_px * strip.fineness * 20,
+                "{scene:?}"
+            );
+            assert!(
+                strip.values.iter().all(|v| (0.0..=1.0001).contains(v)),
+                "{scene:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_bar_has_its_width_and_place() {
+        let strip = Scene::Bar { width_px: 30.3 }
+            .strip(100, 20, 2, 0.0, 1)
+            .expect("no files");
+        let row = &strip.values[..strip.period_px * 2];
+        let sum: f32 = row.iter().sum();
+        let middle: f32 = row
+            .iter()
+            .enumerate()
+            .map(|(k, v)| k as f32 * 0.5 * v)
+            .sum::<f32>()
+            / sum;
+        assert!(
+            (sum * 0.5 - 30.3).abs() < 1e-3 && (middle - 50.0).abs() < 1e-3,
+            "{sum} {middle}"
+        );
+    }
+
+    #[test]
+    fn sky_has_no_texture_and_land_has() {
+        let strip = Scene::Photo { sky: 0.3 }
+            .strip(128, 0, 60, 0.0, 3)
+            .expect("no files");
+        let swing = |y: usize| {
+            let row = &strip.values[y * strip.period_px..][..strip.period_px];
+            row.iter().fold(0.0f32, |a, &v| a.max(v)) - row.iter().fold(1.0f32, |a, &v| a.min(v))
+        };
+        assert!((0..15).all(|y| swing(y) == 0.0));
+        assert!((22..60).all(|y| swing(y) > 0.1));
+    }
+
+    #[test]
+    fn a_picture_file_is_read_and_a_wrong_one_refused_with_its_name() {
+        let dir = std::env::temp_dir();
+        let path = dir.join(format!("rowtone-scene-{}.png", std::process::id()));
+        let grey = image::GrayImage::from_fn(50, 40, |x, y| image::Luma([(x * 4 + y) as u8]));
+        grey.save(&path).expect("a temporary file");
+        let strip = Scene::Picture { path: path.clone() }
+            .strip(80, 20, 20, 0.0, 1)
+            .expect("a good picture");
+        std::fs::remove_file(&path).expect("just written");
+        assert_eq!(strip.values.len(), strip.period_px * 20);
+        let missing = Scene::Picture { path }
+            .strip(80, 20, 20, 0.0, 1)
+            .expect_err("it is gone")
+            .to_string();
+        assert!(missing.contains("rowtone-scene-"), "{missing}");
+    }
+}
