@@ -1,12 +1,13 @@
 //! What is said about one window of time, in which units.
 
 use heapless::Vec;
+use serde::{Deserialize, Serialize};
 
 /// Most peaks one report can hold.
 pub const MAX_PEAKS: usize = 16;
 
 /// One tone of the machine.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Peak {
     /// Frequency, Hz.
     pub hz: f32,
@@ -49,11 +50,11 @@ pub enum Warning {
 }
 
 /// A set of [`Warning`]s.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Warnings(pub u16);
 
 /// One window of time, as a board sends it.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Report {
     /// Number of the report, from 0; a lost one leaves a gap.
     pub seq: u32,

@@ -1,12 +1,14 @@
 //! What a board can say.
 
+use serde::{Deserialize, Serialize};
+
 use crate::report::Report;
 
 /// Longest text of a [`Reply`], bytes.
 pub const REPLY_LEN: usize = 160;
 
 /// Where the settings in use came from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum SettingsOrigin {
     /// The built-in defaults: nothing was ever saved, or it was cleared.
     Defaults,
@@ -19,7 +21,7 @@ pub enum SettingsOrigin {
 }
 
 /// How the board itself is doing.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Status {
     /// Version of the firmware: major, minor, patch.
     pub version: [u16; 3],
@@ -40,7 +42,7 @@ pub struct Status {
 }
 
 /// The answer to one command.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Reply {
     /// Whether the command was carried out.
     pub ok: bool,
@@ -49,7 +51,7 @@ pub struct Reply {
 }
 
 /// One thing said over the line.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[expect(
     clippy::large_enum_variant,
     reason = "there is no heap to box a report on, and one message lives at a time"

@@ -5,12 +5,14 @@
 //! | wire | one message is | for |
 //! | --- | --- | --- |
 //! | [`text`] | one line of printable ASCII, `$RT…*` and a CRC-32 | people, scripts (default) |
+//! | [`binary`] | postcard, CRC-32 and COBS between zero bytes | slow lines, programs |
 //!
 //! Both directions are here, so what can be written can be read, and what is read has passed its
 //! checksum *and* every range check. Nothing allocates: encoders write into what the caller
 //! lends, decoders take bytes as they come and keep at most one message. `docs/wire.md` says
 //! the same precisely enough to write a decoder in another language.
 
+pub mod binary;
 mod check;
 mod decimal;
 mod message;
