@@ -15,6 +15,7 @@ pub struct Buffers {
     mean: Vec<u16>,
     learning: Vec<rowtone::tracker::RowLearning>,
     mask: Vec<u8>,
+    activity: Vec<u8>,
     scratch: Vec<f32>,
 }
 
@@ -28,7 +29,8 @@ impl Buffers {
             mean: vec![0; pixels],
             learning: vec![Default::default(); part.height],
             mask: vec![u8::MAX; part.width],
-            scratch: vec![0.0; part.width],
+            activity: vec![0; part.width],
+            scratch: vec![0.0; 2 * part.width],
         }
     }
 
@@ -39,6 +41,7 @@ impl Buffers {
             mean: &mut self.mean,
             learning: &mut self.learning,
             mask: &mut self.mask,
+            activity: &mut self.activity,
             scratch: &mut self.scratch,
         }
     }
