@@ -5,6 +5,7 @@
 //! flushed as it is complete, and turns a closed pipe into [`Failure::OutputClosed`].
 
 pub mod json;
+pub mod plot;
 pub mod progress;
 pub mod series;
 pub mod text;
