@@ -16,5 +16,5 @@ pub mod failure;
 pub mod input;
 pub mod output;
 pub mod serial;
-pub mod tracking;
 pub mod sim;
+pub mod tracking;

@@ -15,6 +15,7 @@ use crate::failure::Failure;
 pub mod demo;
 pub mod displacement;
 pub mod monitor;
+pub mod simulate;
 
 /// Measures vibration with a rolling-shutter camera: every row of a frame is a sample in time.
 #[derive(Debug, Parser)]
@@ -38,6 +39,8 @@ enum Command {
     Displacement(displacement::Args),
     /// Decodes what a board sends over a serial port
     Monitor(monitor::Args),
+    /// Writes a simulated clip, with the truth beside it
+    Simulate(simulate::Args),
 }
 
 fn run(command: &Command) -> Result<(), Failure> {
@@ -45,6 +48,7 @@ fn run(command: &Command) -> Result<(), Failure> {
         Command::Demo(args) => demo::run(args),
         Command::Displacement(args) => displacement::run(args),
         Command::Monitor(args) => monitor::run(args),
+        Command::Simulate(args) => simulate::run(args),
     }
 }
 

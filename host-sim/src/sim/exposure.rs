@@ -8,7 +8,7 @@
 use super::config::Config;
 use super::texture::Kernel;
 
-/// Nodes and weights on -1 to 1 for every number of nodes up to [`MOST_NODES`].
+/// Nodes and weights on -1 to 1 for every number of nodes up to 32.
 #[derive(Clone, Debug)]
 pub struct Quadrature {
     rules: Vec<Vec<(f64, f64)>>,

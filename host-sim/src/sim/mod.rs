@@ -41,6 +41,7 @@ pub mod exposure;
 pub mod light;
 pub mod motion;
 pub mod noise;
+pub mod parallel;
 pub mod preset;
 pub mod scene;
 pub mod schedule;
