@@ -6,6 +6,8 @@
 //! |h| ≤ [`MAX_COEFFICIENT`], so that a pair of products u8 × i8 never leaves 16 bits.
 #![allow(unsafe_code)]
 
+#[cfg(all(target_arch = "arm", target_feature = "dsp"))]
+mod cortex_m;
 mod portable;
 #[cfg(target_arch = "x86_64")]
 mod x86_64;
@@ -28,6 +30,9 @@ pub struct Sums {
 pub enum Kernel {
     /// Plain Rust, for every machine.
     Portable,
+    /// Cortex-M with the DSP extension: two products an instruction.
+    #[cfg(all(target_arch = "arm", target_feature = "dsp"))]
+    CortexM,
     /// x86-64 with AVX2: 32 pixels a step.
     #[cfg(target_arch = "x86_64")]
     Avx2,
@@ -40,6 +45,9 @@ impl Kernel {
         if x86_64::available() {
             return Self::Avx2;
         }
+        #[cfg(all(target_arch = "arm", target_feature = "dsp"))]
+        return Self::CortexM;
+        #[cfg(not(all(target_arch = "arm", target_feature = "dsp")))]
         Self::Portable
     }
 
@@ -55,6 +63,8 @@ impl Kernel {
     pub fn sums_u8(self, pixels: &[u8], coefficients: &[i8]) -> Sums {
         match self {
             Self::Portable => portable::sums_u8(pixels, coefficients),
+            #[cfg(all(target_arch = "arm", target_feature = "dsp"))]
+            Self::CortexM => cortex_m::sums_u8(pixels, coefficients),
             // SAFETY: the variant is only made by `detect`, which asked the processor for AVX2.
             #[cfg(target_arch = "x86_64")]
             Self::Avx2 => unsafe { x86_64::sums_u8(pixels, coefficients) },
@@ -66,6 +76,9 @@ impl Kernel {
     pub fn sums_u16(self, pixels: &[u16], coefficients: &[i8]) -> Sums {
         match self {
             Self::Portable => portable::sums_u16(pixels, coefficients),
+            // Deeper pixels come from larger boards: plain Rust serves.
+            #[cfg(all(target_arch = "arm", target_feature = "dsp"))]
+            Self::CortexM => portable::sums_u16(pixels, coefficients),
             // SAFETY: the variant is only made by `detect`, which asked the processor for AVX2.
             #[cfg(target_arch = "x86_64")]
             Self::Avx2 => unsafe { x86_64::sums_u16(pixels, coefficients) },

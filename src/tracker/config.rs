@@ -1,6 +1,6 @@
 //! How a tracker is to work, and the memory that it is lent.
 
-use super::RowLearning;
+use super::{ColumnLearning, RowLearning};
 use crate::{band::Level, camera::Timing, kernel::Kernel, reference::RowTable};
 use core::fmt;
 
@@ -48,7 +48,7 @@ impl Config {
     }
 }
 
-/// Memory of a tracker, lent by the caller: 3·width + 24 bytes a row, and 10 bytes a column. The line
+/// Memory of a tracker, lent by the caller: 3·width + 24 bytes a row, and 15 bytes a column. The line
 /// path itself reads width + 16 bytes a row.
 #[derive(Debug)]
 pub struct Storage<'a> {
@@ -63,8 +63,8 @@ pub struct Storage<'a> {
     /// width: weight of each column, 0 = unused … 255. Kept as given, but for dead columns, which are
     /// masked.
     pub mask: &'a mut [u8],
-    /// width: which columns were seen to change.
-    pub activity: &'a mut [u8],
+    /// width: what learning needs of the columns.
+    pub columns: &'a mut [ColumnLearning],
     /// 2 × width: scratch of building coefficients.
     pub scratch: &'a mut [f32],
 }
@@ -136,7 +136,7 @@ impl Config {
             mean: cut("mean", storage.mean, pixels)?,
             learning: cut("learning", storage.learning, rows)?,
             mask: cut("mask", storage.mask, width)?,
-            activity: cut("activity", storage.activity, width)?,
+            columns: cut("columns", storage.columns, width)?,
             scratch: cut("scratch", storage.scratch, 2 * width)?,
         })
     }

@@ -120,12 +120,10 @@ impl Tracker<'_> {
         }
         let width = usize::from(self.config.width);
         for row in self.storage.coefficients.chunks_exact_mut(width) {
-            move_row(row, by, 0);
+            move_row(row, by);
         }
         for row in self.storage.mean.chunks_exact_mut(width) {
-            let edge = if by > 0 { row.first() } else { row.last() };
-            let edge = edge.copied().unwrap_or(0);
-            move_row(row, by, edge);
+            move_row(row, by);
         }
         self.follow.anchor_px = self.follow.anchor_px.saturating_add(by);
         self.follow.drift_px -= by as f32;
@@ -133,15 +131,17 @@ impl Tracker<'_> {
     }
 }
 
-/// Moves a row to the right by `by` (to the left where negative); what comes in at the end is `fill`.
-fn move_row<T: Copy>(row: &mut [T], by: i32, fill: T) {
+/// Moves a row to the right by `by` (to the left where negative); what comes in repeats the edge.
+pub(super) fn move_row<T: Copy>(row: &mut [T], by: i32) {
     let n = (by.unsigned_abs() as usize).min(row.len());
+    let edge = if by > 0 { row.first() } else { row.last() };
+    let Some(&edge) = edge else { return };
     if by > 0 {
         row.copy_within(..row.len() - n, n);
-        row.iter_mut().take(n).for_each(|v| *v = fill);
+        row.iter_mut().take(n).for_each(|v| *v = edge);
     } else {
         row.copy_within(n.., 0);
-        row.iter_mut().rev().take(n).for_each(|v| *v = fill);
+        row.iter_mut().rev().take(n).for_each(|v| *v = edge);
     }
 }
 
@@ -152,11 +152,12 @@ mod tests {
     #[test]
     fn rows_move_either_way_and_never_beyond() {
         let mut row = [1, 2, 3, 4];
-        move_row(&mut row, 1, 9);
-        assert_eq!(row, [9, 1, 2, 3]);
-        move_row(&mut row, -2, 0);
-        assert_eq!(row, [2, 3, 0, 0]);
-        move_row(&mut row, 99, 7);
-        assert_eq!(row, [7; 4]);
+        move_row(&mut row, 1);
+        assert_eq!(row, [1, 1, 2, 3]);
+        move_row(&mut row, -2);
+        assert_eq!(row, [2, 3, 3, 3]);
+        move_row(&mut row, 99);
+        assert_eq!(row, [2; 4]);
+        move_row::<u8>(&mut [], 3);
     }
 }

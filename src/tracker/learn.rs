@@ -1,6 +1,11 @@
 //! Learning the reference, in two rounds of frames.
 
-use super::{Found, Stage, Tracker, follow::Follow, predict::Prediction, watch::Watch};
+use super::{
+    Found, Stage, Tracker,
+    follow::{Follow, move_row},
+    predict::Prediction,
+    watch::Watch,
+};
 use crate::{
     align, band::Level, noise::NoiseMeter, noise::PixelNoise, pixel::Pixel, reference::RowTable,
 };
@@ -12,6 +17,15 @@ pub struct RowLearning {
     pub(super) shift_px: f32,
     /// Frames that the reference is the mean of.
     pub(super) frames: u16,
+}
+
+/// What learning keeps of a column.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ColumnLearning {
+    /// The first pixel seen.
+    first: Option<u16>,
+    /// How many differed from it.
+    changes: u16,
 }
 
 impl RowLearning {
@@ -51,7 +65,7 @@ impl Tracker<'_> {
         self.storage.learning.fill(RowLearning::default());
         self.storage.tables.fill(RowTable::default());
         self.storage.coefficients.fill(0);
-        self.storage.activity.fill(0);
+        self.storage.columns.fill(ColumnLearning::default());
     }
 
     /// Ends the present round of learning now, with the frames that were seen: for a recording that is
@@ -62,6 +76,7 @@ impl Tracker<'_> {
                 self.settle_noise();
                 self.mask_dead_columns();
                 self.settle_margin();
+                self.centre_rows();
                 if self.config.level.is_none() {
                     self.choose_level();
                 }
@@ -90,12 +105,16 @@ impl Tracker<'_> {
     pub(super) fn learn<P: Pixel>(&mut self, row: usize, pixels: &[P]) {
         let first = self.frames_in_stage <= 1 && self.stage == Stage::Rough;
         let mut shift_px = 0.0;
+        let mut textured = false;
         if !first {
             shift_px = match self.locate(row, pixels) {
                 Found::At {
                     shift_px,
                     information_per_px2,
-                } if information_per_px2 > OWN_INFORMATION_PER_PX2 => shift_px,
+                } if information_per_px2 > OWN_INFORMATION_PER_PX2 => {
+                    textured = true;
+                    shift_px
+                }
                 Found::At { .. } | Found::NoTexture => self.prediction.shift_px(),
                 Found::Disturbed => return,
             };
@@ -111,7 +130,13 @@ impl Tracker<'_> {
             let from_centre = self.prediction.shift_px() - centre;
             self.range_px = self.range_px.max(from_centre.abs());
         }
-        self.measure_noise(row, pixels, shift_px - centre, seen.frames);
+        if row.is_multiple_of(8) {
+            self.note_activity(pixels);
+        }
+        // A row that reads black or white throughout would tell of too little noise.
+        if textured {
+            self.measure_noise(row, pixels, shift_px - centre, seen.frames);
+        }
         self.average(row, pixels, shift_px - centre, u16::MAX);
         if self.stage == Stage::Rough {
             let frames = seen.frames.saturating_add(1);
@@ -154,9 +179,6 @@ impl Tracker<'_> {
             let frames = f32::from(frames);
             self.meter
                 .add_line(mean, pixels, shift_px, self.gain, &self.recipe, frames);
-            if row.is_multiple_of(8) {
-                self.note_activity(row, pixels);
-            }
         }
     }
 
@@ -196,44 +218,53 @@ impl Tracker<'_> {
         self.recipe.level = best.1;
     }
 
+    /// Moves each row's reference by whole pixels to the middle of its motion: the first frame, to which
+    /// it is anchored, may have met the picture anywhere.
+    fn centre_rows(&mut self) {
+        let width = usize::from(self.config.width);
+        let stride = i32::from(self.config.stride);
+        for (mean, learning) in self
+            .storage
+            .mean
+            .chunks_exact_mut(width)
+            .zip(self.storage.learning.iter_mut())
+        {
+            let by = super::nearest(learning.shift_px / stride as f32) * stride;
+            move_row(mean, by);
+            learning.shift_px -= by as f32;
+        }
+    }
+
     fn build_all(&mut self) {
         for row in 0..usize::from(self.config.rows) {
             self.build(row);
         }
     }
 
-    /// A live column is never still: it has noise. What never leaves its mean is dead.
-    fn note_activity<P: Pixel>(&mut self, row: usize, pixels: &[P]) {
-        let width = pixels.len();
-        let Some(mean) = self.storage.mean.get(row * width..(row + 1) * width) else {
-            return;
-        };
-        let value = 1.0 / self.recipe.counts_per_value;
-        for ((&p, &mean), active) in pixels
-            .iter()
-            .zip(mean)
-            .zip(self.storage.activity.iter_mut())
-        {
-            let mean = f32::from(mean) * value;
-            let limit = (0.02 * mean).max(0.75);
-            if (f32::from(p.value()) - mean).abs() > limit {
-                *active = active.saturating_add(1);
-            }
+    /// A live column is never still: it has noise, and its rows differ. What never changes is dead.
+    fn note_activity<P: Pixel>(&mut self, pixels: &[P]) {
+        for (&p, column) in pixels.iter().zip(self.storage.columns.iter_mut()) {
+            let value = *column.first.get_or_insert(p.value());
+            column.changes = column.changes.saturating_add(u16::from(p.value() != value));
         }
     }
 
     /// Masks columns that never changed while their neighbours did: up to three side by side. (A longer
     /// run is a part of the picture without noise, a clipped one say, and knows nothing anyway.)
     fn mask_dead_columns(&mut self) {
-        let active = &self.storage.activity;
-        let dead = |x: usize| active.get(x).is_some_and(|&a| a == 0);
+        let columns = &self.storage.columns;
+        let dead = |x: usize| {
+            columns
+                .get(x)
+                .is_some_and(|c: &ColumnLearning| c.changes == 0)
+        };
         let mut x = 0;
-        while x < active.len() {
+        while x < columns.len() {
             let mut run = 0;
             while dead(x + run) {
                 run += 1;
             }
-            let alone = x > 0 && x + run < active.len();
+            let alone = x > 0 && x + run < columns.len();
             if alone && (1..=3).contains(&run) {
                 for mask in self.storage.mask.iter_mut().skip(x).take(run) {
                     *mask = 0;

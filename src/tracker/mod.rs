@@ -19,7 +19,7 @@ mod watch;
 
 pub use config::{Config, ConfigError, Storage};
 pub use counts::Counts;
-pub use learn::RowLearning;
+pub use learn::{ColumnLearning, RowLearning};
 
 use crate::{
     band::Level,
@@ -93,6 +93,9 @@ enum Found {
 
 /// Beyond this the row's polynomial is left for the next whole shift, px.
 const NEAR_PX: f32 = 0.7;
+
+/// A line that was looked at and is further than this from where it was expected has jumped, px.
+const JUMP_PX: f32 = 1.0;
 
 impl<'a> Tracker<'a> {
     /// A tracker that has learned nothing yet. `storage.mask` is kept as given; the other buffers are
@@ -242,7 +245,11 @@ impl<'a> Tracker<'a> {
                 self.follow_row(row, pixels, shift_px);
             }
         }
-        self.prediction.add(shift_px, information_per_px2);
+        if due && (shift_px - expected).abs() > JUMP_PX {
+            self.prediction.jump(shift_px, information_per_px2);
+        } else {
+            self.prediction.add(shift_px, information_per_px2);
+        }
         Found::At {
             shift_px,
             information_per_px2,
@@ -267,7 +274,7 @@ impl<'a> Tracker<'a> {
         let steps = |px: f32| nearest(px / stride as f32) * stride;
         let mut whole = steps(expected_px).clamp(-limit, limit);
         let mut shift_px = f32::NAN;
-        for _ in 0..4 {
+        for _ in 0..6 {
             let overlap = Overlap::new(width, whole)?;
             let sums = P::sums(
                 self.config.kernel,

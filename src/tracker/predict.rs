@@ -32,6 +32,12 @@ impl Prediction {
         self.information = self.information * Self::KEEP + information;
     }
 
+    /// The picture jumped: what was expected before is worth nothing.
+    pub(super) fn jump(&mut self, shift_px: f32, information: f32) {
+        self.weighted_px = shift_px * information;
+        self.information = information;
+    }
+
     /// Moves the expectation with the reference.
     pub(super) fn move_by(&mut self, px: f32) {
         self.weighted_px += px * self.information;

@@ -139,10 +139,14 @@ impl Tracker<'_> {
         let (value, pitch) = (1.0 / r.counts_per_value, 1.0 / r.stride as f32);
         let own = 1.0 + 1.0 / frames;
         let (mut power, mut slopes, mut n) = (0.0f32, 0.0f32, 0.0f32);
+        // What the motion carries in and out at the ends is little known.
+        let inner = mean.len().checked_sub(2 * r.margin_px + 2 * r.stride)?;
         for ((window, &p), &mask) in mean
+            .get(r.margin_px..)?
             .windows(2 * r.stride + 1)
-            .zip(line.get(r.stride..)?)
-            .zip(mask.get(r.stride..)?)
+            .zip(line.get(r.margin_px + r.stride..)?)
+            .zip(mask.get(r.margin_px + r.stride..)?)
+            .take(inner)
             .step_by(4)
         {
             let (Some(&left), Some(&here), Some(&right)) =

@@ -15,7 +15,7 @@ pub struct Buffers {
     mean: Vec<u16>,
     learning: Vec<rowtone::tracker::RowLearning>,
     mask: Vec<u8>,
-    activity: Vec<u8>,
+    columns: Vec<rowtone::tracker::ColumnLearning>,
     scratch: Vec<f32>,
 }
 
@@ -29,7 +29,7 @@ impl Buffers {
             mean: vec![0; pixels],
             learning: vec![Default::default(); part.height],
             mask: vec![u8::MAX; part.width],
-            activity: vec![0; part.width],
+            columns: vec![Default::default(); part.width],
             scratch: vec![0.0; 2 * part.width],
         }
     }
@@ -41,7 +41,7 @@ impl Buffers {
             mean: &mut self.mean,
             learning: &mut self.learning,
             mask: &mut self.mask,
-            activity: &mut self.activity,
+            columns: &mut self.columns,
             scratch: &mut self.scratch,
         }
     }
