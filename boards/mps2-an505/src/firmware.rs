@@ -4,8 +4,13 @@ use crate::board::{counter::Counter, host, stack, uart::Uart};
 use crate::lines::{ClipError, Lines, MAX_WIDTH};
 use core::fmt::Write;
 use cortex_m_rt::entry;
-use rowtone::camera::{Line, Pixels, Timing};
+use rowtone::{
+    camera::{Line, Pixels, Timing, TimingError},
+    reference::RowTable,
+    tracker::{Config, ConfigError, Outcome, RowLearning, Stage, Storage, Tracker},
+};
 use rowtone_mps2_an505::args::Args;
+use static_cell::{ConstStaticCell, StaticCell};
 
 /// What is counted of one kind of work.
 #[derive(Default)]
@@ -42,39 +47,70 @@ fn start() -> ! {
     host::exit(result.is_ok())
 }
 
-fn run(args: &Args, uart: &mut Uart) -> Result<(), ClipError> {
+/// Memory of the tracker: the RP2350 has room for a picture of 320 x 240.
+const PIXELS: usize = 320 * 240;
+/// A narrower picture may have more rows.
+const ROWS: usize = 480;
+
+static COEFFICIENTS: ConstStaticCell<[i8; PIXELS]> = ConstStaticCell::new([0; PIXELS]);
+static MEAN: ConstStaticCell<[u16; PIXELS]> = ConstStaticCell::new([0; PIXELS]);
+static TABLES: StaticCell<[RowTable; ROWS]> = StaticCell::new();
+static LEARNING: StaticCell<[RowLearning; ROWS]> = StaticCell::new();
+static MASK: ConstStaticCell<[u8; MAX_WIDTH]> = ConstStaticCell::new([255; MAX_WIDTH]);
+static SCRATCH: ConstStaticCell<[f32; MAX_WIDTH]> = ConstStaticCell::new([0.0; MAX_WIDTH]);
+
+fn storage() -> Storage<'static> {
+    Storage {
+        coefficients: COEFFICIENTS.take(),
+        tables: TABLES.init_with(|| [RowTable::default(); ROWS]),
+        mean: MEAN.take(),
+        learning: LEARNING.init_with(|| [RowLearning::default(); ROWS]),
+        mask: MASK.take(),
+        scratch: SCRATCH.take(),
+    }
+}
+
+fn run(args: &Args, uart: &mut Uart) -> Result<(), Failure> {
     let counter = cortex_m::Peripherals::take()
         .filter(|_| args.icount)
         .map(|p| Counter::new(p.SYST));
     let mut lines = Lines::open(args.clip, args.fps_uhz)?;
     let clip = *lines.clip();
-    let timing = Timing::new(args.line_time_ps, args.exposure_ns, clip.rows).ok();
+    let timing =
+        Timing::new(args.line_time_ps, args.exposure_ns, clip.rows).map_err(Failure::Timing)?;
+    let mut config = Config::new(timing, clip.width);
+    config.learn_frames = u16::MAX;
+    let mut tracker = Tracker::new(config, storage()).map_err(Failure::Config)?;
     let mut pixels = [0u8; MAX_WIDTH];
     let mut per_line = Count::default();
-    let mut sum = 0u32;
-    while let Some((frame, row)) = lines.next(&mut pixels)? {
-        let start_ns = clip.frame_start_ns(frame) + timing.map_or(0, |t| t.start_ns(row));
-        let line = Line {
-            frame,
-            row,
-            start_ns,
-            pixels: Pixels::U8(&pixels[..usize::from(clip.width)]),
-        };
-        let start = counter.as_ref().map(Counter::start);
-        if let Pixels::U8(p) = line.pixels {
-            sum = core::hint::black_box(p)
-                .iter()
-                .fold(sum, |s, &p| s.wrapping_add(p.into()));
+    for _ in 0..3 {
+        while let Some((frame, row)) = lines.next(&mut pixels)? {
+            let start_ns = clip.frame_start_ns(frame) + timing.start_ns(row);
+            let line = Line {
+                frame,
+                row,
+                start_ns,
+                pixels: Pixels::U8(&pixels[..usize::from(clip.width)]),
+            };
+            let start = counter.as_ref().map(Counter::start);
+            let outcome = tracker.push(&line);
+            if let (Some(counter), Some(start)) = (&counter, start) {
+                if tracker.stage() == Stage::Tracking {
+                    per_line.add(counter.instructions(start));
+                }
+            }
+            if let Outcome::Measured(d) = outcome
+                && row == 100
+            {
+                let _ = writeln!(uart, "{} {} {}", d.frame, d.time_ns, d.shift_px);
+            }
         }
-        if let (Some(counter), Some(start)) = (&counter, start) {
-            per_line.add(counter.instructions(start));
-        }
+        tracker.end_round();
+        lines.rewind()?;
     }
     let _ = writeln!(
         uart,
-        "frames={} lines={} sum={sum} insn_per_line={} max_insn_per_line={} stack_max_bytes={} ram_static_bytes={} flash_bytes={}",
-        lines.frames(),
-        u64::from(lines.frames()) * u64::from(clip.rows),
+        "insn_per_line={} max_insn_per_line={} stack_max_bytes={} ram_static_bytes={} flash_bytes={}",
         per_line.mean(),
         per_line.max,
         stack::used_max_bytes(),
@@ -82,6 +118,29 @@ fn run(args: &Args, uart: &mut Uart) -> Result<(), ClipError> {
         stack::flash_bytes()
     );
     Ok(())
+}
+
+/// Why a clip was not measured to its end.
+enum Failure {
+    Clip(ClipError),
+    Timing(TimingError),
+    Config(ConfigError),
+}
+
+impl core::fmt::Display for Failure {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Clip(e) => e.fmt(f),
+            Self::Timing(e) => e.fmt(f),
+            Self::Config(e) => e.fmt(f),
+        }
+    }
+}
+
+impl From<ClipError> for Failure {
+    fn from(e: ClipError) -> Self {
+        Self::Clip(e)
+    }
 }
 
 #[panic_handler]
