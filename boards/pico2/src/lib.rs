@@ -1,0 +1,10 @@
+//! What the RP2350's firmware is made of, as far as it knows no chip: all of it is tested on the host.
+//!
+//! The way of a line: [`capture`] (PIO program, pins to words) → [`handover`] (two buffers between the
+//! interrupt and core 0) → [`frames`] (words to [`rowtone::camera::Line`]: row, frame, time) → the core.
+//! Beside it: [`hm01b0`] sets the camera up, [`health`] says what is wrong and what to do about it, [`led`]
+//! shows it.
+#![cfg_attr(not(test), no_std)]
+
+pub mod capture;
+pub mod hm01b0;
