@@ -6,5 +6,12 @@
 //! shows it.
 #![cfg_attr(not(test), no_std)]
 
+pub mod boot;
 pub mod capture;
+pub mod clock;
+pub mod frames;
+pub mod handover;
+pub mod health;
 pub mod hm01b0;
+pub mod led;
+pub mod memory;

@@ -4,15 +4,15 @@ use rowtone_pico2::capture::{HREF, PCLK};
 use rowtone_pico2::hm01b0::{Bus, ROWS, WIDTH};
 
 /// VSYNC's pin, counted from D0.
-pub const VSYNC: u8 = 10;
+pub(crate) const VSYNC: u8 = 10;
 /// Time of one cycle of the state machine at 150 MHz, ns.
-pub const CYCLE_NS: f64 = 1000.0 / 150.0;
+pub(crate) const CYCLE_NS: f64 = 1000.0 / 150.0;
 
 /// A small random number generator (SplitMix64), so that a run can be repeated.
-pub struct Random(pub u64);
+pub(crate) struct Random(pub u64);
 
 impl Random {
-    pub fn next(&mut self) -> u64 {
+    pub(crate) fn next(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
         let z = (self.0 ^ self.0 >> 30).wrapping_mul(0xBF58_476D_1CE4_E5B9);
         let z = (z ^ z >> 27).wrapping_mul(0x94D0_49BB_1331_11EB);
@@ -20,14 +20,14 @@ impl Random {
     }
 
     /// Evenly from −1 to 1.
-    pub fn sign_unit(&mut self) -> f64 {
+    pub(crate) fn sign_unit(&mut self) -> f64 {
         (self.next() >> 11) as f64 / (1u64 << 52) as f64 - 1.0
     }
 }
 
 /// What happens to one row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Fault {
+pub(crate) enum Fault {
     /// HREF falls after this many pixels.
     Short { row: u16, pixels: u16 },
     /// This many pixel clocks do not come, in the middle of the row.
@@ -35,24 +35,24 @@ pub enum Fault {
 }
 
 /// A camera whose pins can be recorded.
-pub struct Camera {
-    pub bus: Bus,
-    pub pclk_hz: f64,
+pub(crate) struct Camera {
+    pub(crate) bus: Bus,
+    pub(crate) pclk_hz: f64,
     /// Pixels from line to line.
-    pub line_length_px: u32,
+    pub(crate) line_length_px: u32,
     /// Largest change of each half period of the clock, of its length.
-    pub jitter: f64,
+    pub(crate) jitter: f64,
     /// Share of a period that the clock is high.
-    pub duty: f64,
+    pub(crate) duty: f64,
     /// Data and HREF change up to this long after (or before) the clock's falling edge, ns.
-    pub skew_ns: f64,
-    pub rows: u16,
-    pub fault: Option<Fault>,
-    pub random: Random,
+    pub(crate) skew_ns: f64,
+    pub(crate) rows: u16,
+    pub(crate) fault: Option<Fault>,
+    pub(crate) random: Random,
 }
 
 impl Camera {
-    pub fn new(bus: Bus, pclk_hz: f64) -> Self {
+    pub(crate) fn new(bus: Bus, pclk_hz: f64) -> Self {
         Self {
             bus,
             pclk_hz,
@@ -67,13 +67,13 @@ impl Camera {
     }
 
     /// The pixel that the camera sees at this place.
-    pub fn pixel(frame: u32, row: u16, column: u16) -> u8 {
+    pub(crate) fn pixel(frame: u32, row: u16, column: u16) -> u8 {
         let place = u64::from(frame) << 32 | u64::from(row) << 16 | u64::from(column);
         Random(place).next() as u8
     }
 
     /// One frame: VSYNC rises two lines before the first row and falls after the last.
-    pub fn frame(&mut self, frame: u32) -> Pins {
+    pub(crate) fn frame(&mut self, frame: u32) -> Pins {
         let mut pins = Pins {
             edges: vec![],
             now_ns: 0.0,
@@ -104,7 +104,7 @@ impl Camera {
         let mut lost = 0..0;
         match self.fault {
             Some(Fault::Short { row: at, pixels }) if at == row => seen = pixels.into(),
-            Some(Fault::LostClocks { row: at, clocks }) if at == row => lost = 700..700 + clocks,
+            Some(Fault::LostClocks { row: at, clocks }) if at == row => lost = 100..100 + clocks,
             _ => {}
         }
         for clock in 0..self.line_length_px * per_pixel {
@@ -138,9 +138,9 @@ impl Camera {
 }
 
 /// All changes of the pins, in time.
-pub struct Pins {
+pub(crate) struct Pins {
     edges: Vec<(f64, u32, u32)>,
-    pub now_ns: f64,
+    pub(crate) now_ns: f64,
     level: u32,
 }
 
@@ -161,7 +161,7 @@ impl Pins {
     }
 
     /// The pins at every cycle of the state machine, the first at `phase` of a cycle.
-    pub fn cycles(&mut self, phase: f64) -> impl Iterator<Item = u32> + '_ {
+    pub(crate) fn cycles(&mut self, phase: f64) -> impl Iterator<Item = u32> + '_ {
         self.edges.sort_by(|a, b| a.0.total_cmp(&b.0));
         let (mut next, mut level, mut n) = (0, 0, 0u64);
         let cycles = (self.now_ns / CYCLE_NS) as u64;

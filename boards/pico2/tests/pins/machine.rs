@@ -6,7 +6,7 @@ use std::collections::VecDeque;
 const FIFO_WORDS: usize = 4;
 
 /// A state machine with shift right and autopush at 32 bits.
-pub struct Machine {
+pub(crate) struct Machine {
     code: Vec<u16>,
     wrap_target: usize,
     wrap_source: usize,
@@ -18,14 +18,14 @@ pub struct Machine {
     osr: u32,
     isr: u32,
     isr_count: u32,
-    pub tx: VecDeque<u32>,
-    pub rx: VecDeque<u32>,
+    pub(crate) tx: VecDeque<u32>,
+    pub(crate) rx: VecDeque<u32>,
     /// The sticky flag FDEBUG.RXSTALL.
-    pub rx_stalled: bool,
+    pub(crate) rx_stalled: bool,
 }
 
 impl Machine {
-    pub fn new(program: &pio::Program<32>, jmp_pin: u8) -> Self {
+    pub(crate) fn new(program: &pio::Program<32>, jmp_pin: u8) -> Self {
         Self {
             code: program.code.to_vec(),
             wrap_target: program.wrap.target.into(),
@@ -45,7 +45,7 @@ impl Machine {
     }
 
     /// One cycle, with the pins as the input synchronisers show them (bit 0: the `in` base).
-    pub fn cycle(&mut self, pins: u32) {
+    pub(crate) fn cycle(&mut self, pins: u32) {
         if self.delay > 0 {
             self.delay -= 1;
             return;

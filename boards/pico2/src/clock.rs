@@ -1,0 +1,194 @@
+//! When each frame began, by the camera's own clock.
+//!
+//! VSYNC's time as an interrupt reads it is a microsecond coarse and late by whatever the interrupt waited
+//! for. The camera's frames are evenly spaced to a few parts in a million, so a straight line through all
+//! VSYNCs tells the times better than each of them: a growing-memory filter of first order (the recursive
+//! least-squares line; e.g. Brookner, *Tracking and Kalman Filtering Made Easy*, section 1.2.10), whose memory
+//! stops growing after [`MEMORY`] frames so that it follows a drifting oscillator.
+
+/// Frames that the line is fitted through at most.
+pub const MEMORY: u32 = 256;
+/// Frames after which the period is known well enough to measure by (some parts in a million).
+pub const SETTLED: u32 = 64;
+
+/// A frame began.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FrameStart {
+    /// Its number: one more than the last one's, and one more for each frame whose VSYNC was not seen.
+    pub frame: u32,
+    /// When, ns.
+    pub start_ns: i64,
+    /// Frames that were not seen just before this one.
+    pub lost: u32,
+}
+
+/// Follows VSYNC.
+#[derive(Clone, Debug)]
+pub struct FrameClock {
+    nominal_ns: i64,
+    /// Period in 1/256 ns: 1 part in 4·10⁹ of a frame.
+    period: i64,
+    /// Last start, likewise.
+    start: i64,
+    frame: u32,
+    /// Frames in the filter's memory, at most [`MEMORY`].
+    seen: u32,
+    glitches: u32,
+}
+
+const SCALE: i64 = 256;
+
+impl FrameClock {
+    /// A clock that expects frames every `nominal_ns`.
+    pub const fn new(nominal_ns: i64) -> Self {
+        let nominal_ns = if nominal_ns < 1 { 1 } else { nominal_ns };
+        Self {
+            nominal_ns,
+            period: nominal_ns * SCALE,
+            start: 0,
+            frame: 0,
+            seen: 0,
+            glitches: 0,
+        }
+    }
+
+    /// VSYNC rose at this time. `None` when it came less than half a period after the last: a glitch.
+    pub fn vsync(&mut self, now_ns: i64) -> Option<FrameStart> {
+        let now = now_ns.saturating_mul(SCALE);
+        if self.seen == 0 {
+            (self.start, self.seen) = (now, 1);
+            return Some(FrameStart {
+                frame: self.frame,
+                start_ns: now_ns,
+                lost: 0,
+            });
+        }
+        let elapsed = now.saturating_sub(self.start);
+        let frames = elapsed.saturating_add(self.period / 2) / self.period;
+        if frames < 1 {
+            self.glitches = self.glitches.saturating_add(1);
+            return None;
+        }
+        if self.seen == 1 && frames == 1 {
+            self.period = elapsed;
+        }
+        let k = i64::from(self.seen);
+        self.seen = (self.seen + 1).min(MEMORY);
+        let predicted = self
+            .start
+            .saturating_add(frames.saturating_mul(self.period));
+        let error = now.saturating_sub(predicted);
+        let (weights, both) = ((k + 1) * (k + 2), 2 * (2 * k + 1));
+        self.start = predicted.saturating_add(error.saturating_mul(both) / weights);
+        self.period = (self.period + error.saturating_mul(6) / weights / frames).max(1);
+        let frames = u32::try_from(frames).unwrap_or(u32::MAX);
+        self.frame = self.frame.wrapping_add(frames);
+        Some(FrameStart {
+            frame: self.frame,
+            start_ns: self.start / SCALE,
+            lost: frames - 1,
+        })
+    }
+
+    /// Forget the rhythm, not the numbers: the camera was started anew.
+    pub fn restart(&mut self) {
+        *self = Self {
+            frame: self.frame.wrapping_add(1),
+            glitches: self.glitches,
+            ..Self::new(self.nominal_ns)
+        };
+    }
+
+    /// The period is known well enough.
+    pub const fn is_settled(&self) -> bool {
+        self.seen >= SETTLED
+    }
+
+    /// Time from frame to frame as measured, ps.
+    pub const fn period_ps(&self) -> u64 {
+        (self.period as u64).saturating_mul(1000) / SCALE as u64
+    }
+
+    /// Measured over nominal period, less 1, in parts in a thousand: wrong clock settings show here.
+    pub const fn off_nominal_permille(&self) -> i64 {
+        (self.period / SCALE - self.nominal_ns) * 1000 / self.nominal_ns
+    }
+
+    /// VSYNCs that came too early to be any.
+    pub const fn glitches(&self) -> u32 {
+        self.glitches
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PERIOD_NS: i64 = 17_472_000;
+
+    /// An interrupt reads whole microseconds, up to 3 µs late.
+    fn read(true_ns: i64, n: i64) -> i64 {
+        let late = (n * 7919 % 3001) + true_ns;
+        late / 1000 * 1000
+    }
+
+    #[test]
+    fn times_are_better_than_their_readings_and_the_period_is_measured() {
+        // 100 ppm off what was configured.
+        let true_period = PERIOD_NS + PERIOD_NS / 10_000;
+        let mut clock = FrameClock::new(PERIOD_NS);
+        let mut worst = 0;
+        for n in 0..2000 {
+            let at = clock.vsync(read(5_000_000 + n * true_period, n)).unwrap();
+            assert_eq!((i64::from(at.frame), at.lost), (n, 0));
+            if clock.is_settled() {
+                let error = at.start_ns - (5_000_000 + n * true_period + 1000); // the mean reading is 1 µs late
+                worst = worst.max(error.abs());
+            }
+        }
+        assert!(worst < 600, "{worst} ns");
+        let ppm = (clock.period_ps() as f64 / (true_period as f64 * 1000.0) - 1.0) * 1e6;
+        assert!(ppm.abs() < 1.0, "{ppm} ppm");
+    }
+
+    #[test]
+    fn lost_frames_are_counted_and_glitches_ignored() {
+        let mut clock = FrameClock::new(PERIOD_NS);
+        for n in 0..100 {
+            clock.vsync(n * PERIOD_NS);
+        }
+        assert_eq!(clock.vsync(99 * PERIOD_NS + 300_000), None);
+        assert_eq!(clock.glitches(), 1);
+        let after = clock.vsync(104 * PERIOD_NS).unwrap();
+        assert_eq!((after.frame, after.lost), (104, 4));
+    }
+
+    #[test]
+    fn a_camera_with_another_oscillator_is_followed_and_told() {
+        let mut clock = FrameClock::new(PERIOD_NS);
+        for n in 0..100 {
+            assert_eq!(clock.vsync(n * PERIOD_NS * 25 / 24).unwrap().lost, 0);
+        }
+        assert_eq!(clock.off_nominal_permille(), 41);
+    }
+
+    #[test]
+    fn restart_keeps_counting() {
+        let mut clock = FrameClock::new(PERIOD_NS);
+        for n in 0..70 {
+            clock.vsync(n * PERIOD_NS);
+        }
+        clock.restart();
+        assert!(!clock.is_settled());
+        assert_eq!(clock.vsync(90 * PERIOD_NS).unwrap().frame, 70);
+    }
+
+    #[test]
+    fn no_time_breaks_it() {
+        let mut clock = FrameClock::new(0);
+        for t in [0, i64::MAX, i64::MIN, -1, 1, i64::MAX] {
+            let _ = clock.vsync(t);
+            let _ = clock.off_nominal_permille();
+        }
+    }
+}
