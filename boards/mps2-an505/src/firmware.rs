@@ -6,11 +6,11 @@ use core::fmt::Write;
 use cortex_m_rt::entry;
 use rowtone::{
     camera::{Line, Pixels, Timing, TimingError},
-    reference::RowTable,
-    tracker::{Config, ConfigError, Outcome, RowLearning, Stage, Storage, Tracker},
+    tracker::{Config, ConfigError, Outcome, Stage, Tracker},
 };
 use rowtone_mps2_an505::args::Args;
-use static_cell::{ConstStaticCell, StaticCell};
+use rowtone_pico2::memory::TrackerMemory;
+use static_cell::ConstStaticCell;
 
 /// What is counted of one kind of work.
 #[derive(Default)]
@@ -47,28 +47,9 @@ fn start() -> ! {
     host::exit(result.is_ok())
 }
 
-/// Memory of the tracker: the RP2350 has room for a picture of 320 x 240.
-const PIXELS: usize = 320 * 240;
-/// A narrower picture may have more rows.
-const ROWS: usize = 480;
-
-static COEFFICIENTS: ConstStaticCell<[i8; PIXELS]> = ConstStaticCell::new([0; PIXELS]);
-static MEAN: ConstStaticCell<[u16; PIXELS]> = ConstStaticCell::new([0; PIXELS]);
-static TABLES: StaticCell<[RowTable; ROWS]> = StaticCell::new();
-static LEARNING: StaticCell<[RowLearning; ROWS]> = StaticCell::new();
-static MASK: ConstStaticCell<[u8; MAX_WIDTH]> = ConstStaticCell::new([255; MAX_WIDTH]);
-static SCRATCH: ConstStaticCell<[f32; MAX_WIDTH]> = ConstStaticCell::new([0.0; MAX_WIDTH]);
-
-fn storage() -> Storage<'static> {
-    Storage {
-        coefficients: COEFFICIENTS.take(),
-        tables: TABLES.init_with(|| [RowTable::default(); ROWS]),
-        mean: MEAN.take(),
-        learning: LEARNING.init_with(|| [RowLearning::default(); ROWS]),
-        mask: MASK.take(),
-        scratch: SCRATCH.take(),
-    }
-}
+/// The RP2350 has room for a picture of 320 x 240; a narrower one may have more rows here.
+static MEMORY: ConstStaticCell<TrackerMemory<{ 320 * 240 }, 480, MAX_WIDTH>> =
+    ConstStaticCell::new(TrackerMemory::new());
 
 fn run(args: &Args, uart: &mut Uart) -> Result<(), Failure> {
     let counter = cortex_m::Peripherals::take()
@@ -80,7 +61,8 @@ fn run(args: &Args, uart: &mut Uart) -> Result<(), Failure> {
         Timing::new(args.line_time_ps, args.exposure_ns, clip.rows).map_err(Failure::Timing)?;
     let mut config = Config::new(timing, clip.width);
     config.learn_frames = u16::MAX;
-    let mut tracker = Tracker::new(config, storage()).map_err(Failure::Config)?;
+    config.columns_per_line = 4;
+    let mut tracker = Tracker::new(config, MEMORY.take().lend()).map_err(Failure::Config)?;
     let mut pixels = [0u8; MAX_WIDTH];
     let mut per_line = Count::default();
     for _ in 0..3 {
