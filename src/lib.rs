@@ -3,6 +3,7 @@
 #![deny(unsafe_code)]
 
 mod align;
+pub mod analyzer;
 pub mod band;
 pub mod camera;
 pub mod kernel;
@@ -10,6 +11,7 @@ pub mod noise;
 mod pixel;
 pub mod reference;
 pub mod report;
+pub mod spectrum;
 pub mod timeline;
 pub mod tracker;
 pub mod wire;

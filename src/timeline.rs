@@ -4,6 +4,10 @@
 //! by their information: this is the vertical extent of the shearlet (its low-pass along y), and it is
 //! where the sensitivity comes from.
 
+mod binner;
+
+pub use binner::{Binner, BinnerError, Group, rows_per_sample};
+
 /// How far one row is shifted against its reference.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Displacement {

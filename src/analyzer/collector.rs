@@ -1,0 +1,283 @@
+//! The line side: a ring of frames, and when a window is complete.
+
+use super::Reporter;
+use crate::spectrum::{
+    Config, ConfigError, FrameMark, SampleBuffer, WindowMark, pack_weight, skew_of,
+};
+use crate::timeline::{Group, Sample};
+
+/// Collects samples to windows.
+#[derive(Debug)]
+pub struct Collector<'a> {
+    window_ns: i64,
+    hop_ns: i64,
+    group: Group,
+    ring: SampleBuffer<'a>,
+    /// Frames the ring holds.
+    capacity: usize,
+    /// Column of the oldest frame, and how many there are.
+    oldest: usize,
+    held: usize,
+    /// The sample that showed a window to be complete; it belongs to the next.
+    pending: Option<Sample>,
+    origin_ns: Option<i64>,
+    /// End of the window being collected, ns.
+    end_ns: i64,
+    /// End of the last window that was complete, ns.
+    done_ns: Option<i64>,
+    ready: Option<WindowMark>,
+    /// The frames held belong to the past: forget them before the next is stored.
+    restart: bool,
+    seq: u32,
+    dropped_samples: u32,
+    dropped_windows: u32,
+}
+
+impl<'a> Collector<'a> {
+    /// # Errors
+    /// [`ConfigError`] when the config cannot be used or `ring` does not hold two frames.
+    pub fn new(config: &Config, group: Group, ring: SampleBuffer<'a>) -> Result<Self, ConfigError> {
+        config.check()?;
+        let holds = ring.frame_capacity(usize::from(group.slots()));
+        let capacity = holds.min(usize::from(u16::MAX));
+        if capacity < 2 {
+            return Err(ConfigError::Storage {
+                part: "collected frames",
+                needs: 2,
+                holds,
+            });
+        }
+        Ok(Self {
+            window_ns: config.window_ns,
+            hop_ns: config.hop_ns,
+            group,
+            ring,
+            capacity,
+            oldest: 0,
+            held: 0,
+            pending: None,
+            origin_ns: None,
+            end_ns: 0,
+            done_ns: None,
+            ready: None,
+            restart: false,
+            seq: 0,
+            dropped_samples: 0,
+            dropped_windows: 0,
+        })
+    }
+
+    /// As [`super::Analyzer::push`]; a complete window waits for [`Collector::hand_over`] until the next push.
+    pub fn push(&mut self, sample: Sample) -> bool {
+        if self.ready.take().is_some() {
+            self.dropped_windows = self.dropped_windows.saturating_add(1);
+        }
+        if let Some(pending) = self.pending.take() {
+            self.store(pending);
+        }
+        let known = sample.information_per_px2 > 0.0
+            && sample.information_per_px2.is_finite()
+            && sample.shift_px.is_finite()
+            && sample.shift_px.abs() < 1e6
+            && sample.slot < self.group.slots();
+        let start_ns = sample
+            .time_ns
+            .saturating_sub(self.group.middle_ns(sample.slot));
+        // Clocks count from when something was switched on: centuries are nonsense.
+        if !known || start_ns.unsigned_abs() > 1 << 62 {
+            self.dropped_samples = self.dropped_samples.saturating_add(1);
+            return false;
+        }
+        if self.origin_ns.is_none() {
+            self.origin_ns = Some(start_ns);
+            self.end_ns = start_ns.saturating_add(self.window_ns);
+        }
+        let new_frame = self.newest().is_none_or(|f| f.number != sample.frame);
+        let back = self
+            .newest()
+            .is_some_and(|f| start_ns < f.start_ns.saturating_sub(self.window_ns));
+        if back || (new_frame && start_ns >= self.end_ns) {
+            let complete = self.complete(self.end_ns);
+            self.pending = Some(sample);
+            self.advance(start_ns, back);
+            return complete;
+        }
+        self.store(sample);
+        false
+    }
+
+    /// The input ends: what has come since the last window becomes one, if it is half a hop or more.
+    pub fn finish(&mut self) -> bool {
+        if self.ready.is_some() {
+            return true;
+        }
+        if let Some(pending) = self.pending.take() {
+            self.store(pending);
+        }
+        let Some(newest) = self.newest() else {
+            return false;
+        };
+        // The last frame lasts as long as the others; a lone one as long as its rows.
+        let period = self.period_ns().unwrap_or(self.group.timing().readout_ns());
+        let end = newest.start_ns.saturating_add(period.max(1));
+        let fresh = match self.done_ns {
+            Some(done) => end.saturating_sub(done) * 2 >= self.hop_ns.min(self.window_ns),
+            None => true,
+        };
+        let done = fresh && self.complete(end);
+        self.restart = true;
+        done
+    }
+
+    /// Gives the complete window to the computing side; `false` when none is complete.
+    pub fn hand_over(&mut self, to: &mut Reporter<'_>) -> bool {
+        let Some(mark) = self.ready.take() else {
+            return false;
+        };
+        let (capacity, first) = (self.capacity, self.first_of(mark.start_ns));
+        let (oldest, ring) = (self.oldest, &self.ring);
+        to.load(mark, ring, capacity, |i| (oldest + first + i) % capacity);
+        true
+    }
+
+    /// Samples dropped so far.
+    pub const fn dropped_samples(&self) -> u32 {
+        self.dropped_samples
+    }
+
+    /// Windows complete but never handed over.
+    pub const fn dropped_windows(&self) -> u32 {
+        self.dropped_windows
+    }
+
+    fn column(&self, i: usize) -> usize {
+        (self.oldest + i) % self.capacity
+    }
+
+    fn frame(&self, i: usize) -> Option<FrameMark> {
+        self.ring.frames.get(self.column(i)).copied()
+    }
+
+    fn newest(&self) -> Option<FrameMark> {
+        self.held.checked_sub(1).and_then(|i| self.frame(i))
+    }
+
+    /// How many of the held frames are before `start_ns`.
+    fn first_of(&self, start_ns: i64) -> usize {
+        (0..self.held)
+            .take_while(|&i| self.frame(i).is_some_and(|f| f.start_ns < start_ns))
+            .count()
+    }
+
+    /// Mean time between the frames held, by their numbers.
+    fn period_ns(&self) -> Option<i64> {
+        let (first, last) = (self.frame(0)?, self.newest()?);
+        let periods = i64::from(last.number.wrapping_sub(first.number));
+        let span = last.start_ns.saturating_sub(first.start_ns);
+        (periods > 0 && span > 0 && self.held > 1).then(|| span / periods)
+    }
+
+    fn store(&mut self, sample: Sample) {
+        if self.restart {
+            self.restart = false;
+            self.held = 0;
+        }
+        let start_ns = sample
+            .time_ns
+            .saturating_sub(self.group.middle_ns(sample.slot));
+        if let Some(newest) = self.newest()
+            && newest.number != sample.frame
+            && start_ns <= newest.start_ns
+        {
+            self.dropped_samples = self.dropped_samples.saturating_add(1);
+            return;
+        }
+        let slots = usize::from(self.group.slots());
+        if self.newest().is_none_or(|f| f.number != sample.frame) {
+            if self.held == self.capacity {
+                self.oldest = self.column(1);
+                self.held -= 1;
+            }
+            let column = self.column(self.held);
+            self.held += 1;
+            if let Some(frame) = self.ring.frames.get_mut(column) {
+                *frame = FrameMark {
+                    number: sample.frame,
+                    start_ns,
+                };
+            }
+            for slot in 0..slots {
+                if let Some(weight) = self.ring.weight.get_mut(slot * self.capacity + column) {
+                    *weight = 0;
+                }
+            }
+        }
+        let Some(newest) = self.newest() else { return };
+        let column = self.column(self.held - 1);
+        let at = usize::from(sample.slot) * self.capacity + column;
+        let ring = &mut self.ring;
+        if let (Some(x), Some(w), Some(d)) = (
+            ring.shift_px.get_mut(at),
+            ring.weight.get_mut(at),
+            ring.skew.get_mut(at),
+        ) {
+            *x = sample.shift_px;
+            *w = pack_weight(sample.information_per_px2);
+            *d = skew_of(&self.group, &sample, newest.start_ns);
+        }
+    }
+
+    /// Marks the window that ends at `end_ns` as complete, if there is a frame in it.
+    fn complete(&mut self, end_ns: i64) -> bool {
+        let start_ns = end_ns.saturating_sub(self.window_ns);
+        let first = self.first_of(start_ns);
+        let frames = self.held - first;
+        let (Some(a), Some(b)) = (self.frame(first), self.newest()) else {
+            return false;
+        };
+        if frames == 0 {
+            return false;
+        }
+        let numbers = b.number.wrapping_sub(a.number);
+        let lost = (numbers as usize).saturating_add(1).saturating_sub(frames);
+        let mut lines = 0_u32;
+        for slot in 0..self.group.slots() {
+            for i in first..self.held {
+                let at = usize::from(slot) * self.capacity + self.column(i);
+                if self.ring.weight.get(at).is_some_and(|&w| w > 0) {
+                    lines = lines.saturating_add(u32::from(self.group.rows_of(slot)));
+                }
+            }
+        }
+        let origin_ns = self.origin_ns.unwrap_or(start_ns);
+        let period = self.period_ns().unwrap_or(0);
+        // Short: the first frame is more than a frame late, as at a start or where the ring is too small.
+        let short = a.start_ns.saturating_sub(start_ns) > period.saturating_mul(3) / 2;
+        self.ready = Some(WindowMark {
+            seq: self.seq,
+            start_ns: start_ns.max(a.start_ns),
+            end_ns,
+            origin_ns,
+            frames: frames as u16,
+            lost_frames: lost.min(usize::from(u16::MAX)) as u16,
+            lines,
+            short,
+        });
+        self.seq = self.seq.wrapping_add(1);
+        self.done_ns = Some(end_ns);
+        true
+    }
+
+    /// Moves the end on past `start_ns`; after a pause or a clock set back, begins anew there.
+    fn advance(&mut self, start_ns: i64, back: bool) {
+        let late = start_ns.saturating_sub(self.end_ns);
+        if back || late > self.window_ns {
+            self.end_ns = start_ns.saturating_add(self.window_ns);
+            self.done_ns = None;
+            self.restart = true;
+            return;
+        }
+        let hops = late.max(0) / self.hop_ns + 1;
+        self.end_ns = self.end_ns.saturating_add(hops.saturating_mul(self.hop_ns));
+    }
+}

@@ -1,0 +1,100 @@
+//! The computing side: a window handed over becomes a report.
+
+use crate::report::{Report, Warning, Warnings};
+use crate::spectrum::{
+    Config, ConfigError, Estimator, EstimatorStorage, Follower, SampleBuffer, Tones, WindowMark,
+    name_harmonics,
+};
+use crate::timeline::Group;
+
+/// Makes reports of windows.
+#[derive(Debug)]
+pub struct Reporter<'a> {
+    estimator: Estimator<'a>,
+    follower: Follower,
+    last_end_ns: Option<i64>,
+}
+
+impl<'a> Reporter<'a> {
+    /// # Errors
+    /// [`ConfigError`] when the config cannot be used or the storage is too small.
+    pub fn new(
+        config: Config,
+        group: Group,
+        storage: EstimatorStorage<'a>,
+    ) -> Result<Self, ConfigError> {
+        Ok(Self {
+            estimator: Estimator::new(config, group, storage)?,
+            follower: Follower::new(),
+            last_end_ns: None,
+        })
+    }
+
+    pub(crate) fn load(
+        &mut self,
+        mark: WindowMark,
+        from: &SampleBuffer<'_>,
+        stride: usize,
+        column: impl Fn(usize) -> usize,
+    ) {
+        self.estimator.load(mark, from, stride, column);
+    }
+
+    /// The report of the window handed over last.
+    pub fn report(&mut self) -> Report {
+        let mut tones = self.estimator.tones();
+        let mark = *self.estimator.mark();
+        let window_s = mark.end_ns.saturating_sub(mark.start_ns).max(1) as f32 * 1e-9;
+        let elapsed_s = self
+            .last_end_ns
+            .map_or(0.0, |last| mark.end_ns.saturating_sub(last) as f32 * 1e-9);
+        self.last_end_ns = Some(mark.end_ns);
+        self.follower
+            .follow(&mut tones.peaks, &tones.hz_per_s, 1.0 / window_s, elapsed_s);
+        name_harmonics(&mut tones.peaks, 1.0 / window_s);
+        let um_per_px = self.estimator.config().um_per_px;
+        Report {
+            seq: mark.seq,
+            time_ms: (mark.end_ns.saturating_sub(mark.origin_ns).max(0) / 1_000_000) as u64,
+            window_s,
+            fps: tones.fps,
+            lines: mark.lines,
+            lost_frames: mark.lost_frames,
+            noise_px: tones.row_noise_px,
+            velocity_mm_s_rms: um_per_px.map(|scale| band_velocity(&tones, scale)),
+            warnings: warnings(&mark, &tones),
+            peaks: tones.peaks,
+            um_per_px,
+        }
+    }
+}
+
+fn warnings(mark: &WindowMark, tones: &Tones) -> Warnings {
+    let mut bits = 0;
+    for (met, warning) in [
+        (tones.hidden, Warning::HiddenNearFrameRate),
+        (mark.lost_frames > 0, Warning::LostFrames),
+        (mark.short, Warning::ShortWindow),
+        (tones.more, Warning::MoreTones),
+    ] {
+        if met {
+            bits |= warning as u16;
+        }
+    }
+    Warnings(bits)
+}
+
+/// Velocity of the peaks within 10–1000 Hz, mm/s RMS: √Σ(2πfA)²/2 (ISO 20816-1).
+fn band_velocity(tones: &Tones, um_per_px: f32) -> f32 {
+    let mut squares = 0.0;
+    for peak in tones
+        .peaks
+        .iter()
+        .filter(|p| (10.0..=1000.0).contains(&p.hz))
+    {
+        let mm = peak.amplitude_px * um_per_px * 1e-3;
+        let speed = core::f32::consts::TAU * peak.hz * mm;
+        squares += 0.5 * speed * speed;
+    }
+    libm::sqrtf(squares)
+}

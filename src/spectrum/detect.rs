@@ -1,0 +1,212 @@
+//! Where in the residual a further tone may be: a periodogram on an even grid.
+//!
+//! The weighted residual is spread on the grid (two points a sample, linearly), transformed, and each bin is
+//! compared by the energy that a tone there would have left after the projection: divided by the kernel of the
+//! spreading and by c(f). This only proposes; whether a tone is there is decided by the joint fit with exact times.
+
+use microfft::Complex32 as Complex;
+
+use super::fit::Model;
+use super::model::Samples;
+use super::phase::{Frequency, cos_sin};
+
+/// Candidates of one search.
+pub(crate) const CANDIDATES: usize = 4;
+
+/// A tone of which less than this share is left after the projection is not looked for: it is hidden.
+pub(crate) const LEAST_KEPT: f32 = 0.03;
+
+/// Where a tone may be.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Candidate {
+    pub(crate) frequency: Frequency,
+    /// About by how much it would lower the weighted sum of squares.
+    pub(crate) gain: f32,
+}
+
+/// The grid: `step_s` between points, `points` a power of two.
+#[derive(Clone, Copy, Debug)]
+struct Grid {
+    points: usize,
+    step_s: f32,
+}
+
+impl Grid {
+    fn over(length_s: f32, highest_hz: f32, most: usize) -> Self {
+        let wanted = 1.5 * length_s * highest_hz / 0.36;
+        let mut points = 64;
+        while points * 2 <= most.min(32_768) && (points as f32) < wanted {
+            points *= 2;
+        }
+        Self {
+            points,
+            step_s: (0.36 / highest_hz).max(1.1 * length_s / points as f32),
+        }
+    }
+
+    fn bin_hz(&self) -> f32 {
+        1.0 / (self.points as f32 * self.step_s)
+    }
+
+    /// What the linear spreading leaves of a tone's energy.
+    fn kernel(&self, hz: f32) -> f32 {
+        let x = core::f32::consts::PI * hz * self.step_s;
+        if x < 1e-3 {
+            return 1.0;
+        }
+        let sinc = libm::sinf(x) / x;
+        (sinc * sinc) * (sinc * sinc)
+    }
+}
+
+/// What is searched.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Band {
+    pub(crate) lowest_hz: f32,
+    pub(crate) highest_hz: f32,
+    /// Frame rate, where the window has a single one.
+    pub(crate) fps: Option<f32>,
+}
+
+/// The largest peaks of the residual, the largest first.
+pub(crate) fn candidates(
+    samples: &mut Samples<'_>,
+    model: &Model,
+    grid: &mut [f32],
+    band: Band,
+) -> heapless::Vec<Candidate, CANDIDATES> {
+    let mut found = heapless::Vec::new();
+    let g = Grid::over(samples.length_s, band.highest_hz, grid.len());
+    let Some(points) = grid.get_mut(..g.points) else {
+        return found;
+    };
+    spread(samples, model, points, g);
+    let Some(bins) = transform(points) else {
+        return found;
+    };
+    let bin_hz = g.bin_hz();
+    let first = (libm::ceilf(band.lowest_hz / bin_hz) as usize).max(2);
+    let last = ((band.highest_hz / bin_hz) as usize).min(bins.len().saturating_sub(2));
+    let scale = 2.0 / samples.total_weight;
+    for b in first..=last {
+        let here = bins[b].norm_sqr();
+        let (before, after) = (bins[b - 1].norm_sqr(), bins[b + 1].norm_sqr());
+        // Written so that a NaN is no peak.
+        if !(here > before && here >= after) {
+            continue;
+        }
+        let (shift, height) = parabola(before, here, after);
+        let hz = (b as f32 + shift) * bin_hz;
+        let mut gain = scale * height / g.kernel(hz);
+        let least = found.last().map_or(0.0, |c: &Candidate| c.gain);
+        let near = band.fps.is_some_and(|fps| {
+            let away = hz - fps * libm::roundf(hz / fps);
+            away.abs() * samples.length_s < 1.2
+        });
+        if near {
+            if found.is_full() && gain < least * LEAST_KEPT {
+                continue;
+            }
+            let kept = kept_at(samples, hz);
+            if kept < LEAST_KEPT {
+                continue;
+            }
+            gain /= kept;
+        }
+        let candidate = Candidate {
+            frequency: Frequency::from_hz(b as f32 * bin_hz).plus(shift * bin_hz),
+            gain,
+        };
+        insert(&mut found, candidate);
+    }
+    found
+}
+
+/// Share of a tone's energy left after the projection, from the frames' own times.
+pub(crate) fn kept_at(samples: &Samples<'_>, hz: f32) -> f32 {
+    let frequency = Frequency::from_hz(hz);
+    let (mut re, mut im) = (0.0, 0.0);
+    for (&ns, &w) in samples
+        .frame_ns
+        .iter()
+        .zip(samples.frame_weight.iter())
+        .take(samples.frames)
+    {
+        let (c, s) = cos_sin(frequency.phase(ns));
+        re += w * c;
+        im += w * s;
+    }
+    let total = samples.total_weight * samples.total_weight;
+    (1.0 - (re * re + im * im) / total).clamp(0.0, 1.0)
+}
+
+fn insert(found: &mut heapless::Vec<Candidate, CANDIDATES>, candidate: Candidate) {
+    if found.is_full() {
+        if found.last().is_some_and(|c| c.gain >= candidate.gain) {
+            return;
+        }
+        found.pop();
+    }
+    let place = found
+        .iter()
+        .position(|c| c.gain < candidate.gain)
+        .unwrap_or(found.len());
+    // There is room: the list was shortened above.
+    let _ = found.insert(place, candidate);
+}
+
+/// Vertex of the parabola through three heights one apart, and its height.
+fn parabola(before: f32, here: f32, after: f32) -> (f32, f32) {
+    let bend = before - 2.0 * here + after;
+    if bend >= 0.0 {
+        return (0.0, here);
+    }
+    let shift = (0.5 * (before - after) / bend).clamp(-0.5, 0.5);
+    (shift, here - 0.25 * (before - after) * shift)
+}
+
+fn spread(samples: &mut Samples<'_>, model: &Model, points: &mut [f32], g: Grid) {
+    points.fill(0.0);
+    let scale = samples.length_s / g.step_s;
+    let middle = 0.5 * g.points as f32;
+    let last = g.points - 2;
+    for slot in 0..samples.slots {
+        if samples.slot_weight[slot] <= 0.0 {
+            continue;
+        }
+        samples.residual(slot, &model.tones, model.drift);
+        let t = samples.slot_t[slot];
+        for (&x, &frame_t) in samples
+            .row
+            .iter()
+            .zip(samples.frame_t.iter())
+            .take(samples.frames)
+        {
+            let at = (frame_t + t) * scale + middle;
+            let cell = (at as usize).min(last);
+            let share = (at - cell as f32).clamp(0.0, 1.0);
+            points[cell] += x * (1.0 - share);
+            points[cell + 1] += x * share;
+        }
+    }
+}
+
+fn transform(points: &mut [f32]) -> Option<&mut [Complex]> {
+    use microfft::real;
+    macro_rules! by_size {
+        ($($size:literal => $fft:ident),*) => {
+            match points.len() {
+                $($size => {
+                    let points: &mut [f32; $size] = points.try_into().ok()?;
+                    Some(&mut real::$fft(points)[..])
+                })*
+                _ => None,
+            }
+        };
+    }
+    by_size!(
+        64 => rfft_64, 128 => rfft_128, 256 => rfft_256, 512 => rfft_512, 1024 => rfft_1024,
+        2048 => rfft_2048, 4096 => rfft_4096, 8192 => rfft_8192, 16384 => rfft_16384,
+        32768 => rfft_32768
+    )
+}

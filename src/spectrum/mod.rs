@@ -1,0 +1,34 @@
+//! Samples of one window to tones, by a joint weighted fit on the samples that exist.
+//!
+//! Contract: [`Estimator::load`] takes a window (line side's memory is free again), [`Estimator::tones`] fits it and
+//! gives every tone that is above the false-alarm level with its standard deviations. Nothing is allocated; all memory
+//! is lent ([`EstimatorStorage`]). No input makes it panic.
+//!
+//! The idea (docs/spectrum.md has it at length): a periodogram of samples with gaps has ghosts at multiples of the
+//! frame rate around every tone, so it is used only to propose. Tones are added one at a time from the largest of the
+//! residual, tested against the energy that is left of them once every slot's unknown offset is projected away, and all
+//! are refined together at the samples' exact times. The search ends at a false-alarm level.
+
+mod alarm;
+mod cholesky;
+mod config;
+mod detect;
+mod estimator;
+mod fit;
+mod follow;
+mod gram;
+mod model;
+mod phase;
+mod plan;
+mod search;
+mod storage;
+mod window;
+
+pub use config::{Config, ConfigError};
+pub use estimator::{Estimator, Tones};
+pub use follow::{Follower, name_harmonics};
+pub use plan::{FrameRatePlan, PlanError};
+pub use storage::{EstimatorStorage, StaticStorage, Storage};
+pub use window::{FrameMark, SampleBuffer, WindowMark};
+
+pub(crate) use window::{pack_weight, skew_of};

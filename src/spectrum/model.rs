@@ -1,0 +1,349 @@
+//! Tones, their phasor tables, and the one pass over the samples that everything else is made of.
+
+use microfft::Complex32 as Complex;
+
+use super::phase::{Frequency, cos_sin, turns};
+use super::window::unpack_weight;
+use crate::report::MAX_PEAKS;
+
+/// Rows of the phasor tables: row 0 is the slow drift (frequency 0), the others are tones.
+pub(crate) const TABLE_ROWS: usize = MAX_PEAKS + 1;
+
+/// Powers of time a tone's amplitude and phase may need: 1, t, t².
+pub(crate) const POWERS: usize = 3;
+
+/// Independent sums, so that the additions of a dot product need not wait for each other; a
+/// microcontroller has neither the pipeline nor the registers for it.
+const LANES: usize = if cfg!(target_arch = "arm") { 1 } else { 8 };
+
+/// One sinusoid: Re(conj(amplitude) · (1 + growth·t) · e^(2πi(f·t + chirp·t²/2))), t in window lengths.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Tone {
+    pub(crate) frequency: Frequency,
+    /// px.
+    pub(crate) amplitude: Complex,
+    /// Turns per window length squared.
+    pub(crate) chirp: f32,
+    /// Relative change of amplitude over a window length.
+    pub(crate) growth: f32,
+    /// `chirp` and `growth` are fitted.
+    pub(crate) modulated: bool,
+}
+
+impl Tone {
+    pub(crate) fn steady(frequency: Frequency) -> Self {
+        Self {
+            frequency,
+            amplitude: Complex::new(0.0, 0.0),
+            chirp: 0.0,
+            growth: 0.0,
+            modulated: false,
+        }
+    }
+
+    /// Highest power of t among the regressors.
+    pub(crate) fn top_power(&self) -> usize {
+        if self.modulated { 2 } else { 1 }
+    }
+}
+
+/// Weighted inner products of the residual with t^p·e^(iωt), p from 0.
+pub(crate) type Moments = [Complex; POWERS];
+
+/// The window as the passes see it: slices of one length a frame or a slot, tables of one row a tone.
+#[derive(Debug)]
+pub(crate) struct Samples<'a> {
+    pub(crate) frames: usize,
+    pub(crate) slots: usize,
+    /// Slot-major, `frames` a slot.
+    pub(crate) shift_px: &'a mut [f32],
+    pub(crate) weight: &'a mut [u16],
+    pub(crate) skew: &'a mut [i16],
+    /// A step of the skew, ns; `None` where no sample is skewed.
+    pub(crate) skew_ns: Option<f32>,
+    /// Start of a frame after the middle of the window, ns, and in window lengths.
+    pub(crate) frame_ns: &'a mut [i64],
+    pub(crate) frame_t: &'a mut [f32],
+    pub(crate) frame_weight: &'a mut [f32],
+    /// Time of a slot after its frame's mean, ns, and in window lengths.
+    pub(crate) slot_ns: &'a mut [i64],
+    pub(crate) slot_t: &'a mut [f32],
+    pub(crate) slot_weight: &'a mut [f32],
+    /// Phasors, a row a tone.
+    pub(crate) frame_re: &'a mut [f32],
+    pub(crate) frame_im: &'a mut [f32],
+    pub(crate) slot_re: &'a mut [f32],
+    pub(crate) slot_im: &'a mut [f32],
+    /// Scratch, one of each a frame.
+    pub(crate) row: &'a mut [f32],
+    pub(crate) row_t: &'a mut [f32],
+    pub(crate) own_re: &'a mut [f32],
+    pub(crate) own_im: &'a mut [f32],
+    /// Sum of weights.
+    pub(crate) total_weight: f32,
+    /// Samples with a weight.
+    pub(crate) count: u32,
+    /// Length of the window, s.
+    pub(crate) length_s: f32,
+}
+
+impl Samples<'_> {
+    /// Fills table row `k` for `tone`.
+    pub(crate) fn tabulate(&mut self, k: usize, tone: &Tone) {
+        let n = self.frames;
+        let rows = self.frame_re[k * n..]
+            .iter_mut()
+            .zip(self.frame_im[k * n..].iter_mut());
+        for ((re, im), (&ns, &t)) in rows.zip(self.frame_ns.iter().zip(self.frame_t.iter()).take(n))
+        {
+            let mut phase = tone.frequency.phase(ns);
+            if tone.modulated {
+                phase = phase.wrapping_add(turns(0.5 * tone.chirp * t * t));
+            }
+            (*re, *im) = cos_sin(phase);
+        }
+        let s = self.slots;
+        let rows = self.slot_re[k * s..]
+            .iter_mut()
+            .zip(self.slot_im[k * s..].iter_mut());
+        for ((re, im), &ns) in rows.zip(self.slot_ns.iter().take(s)) {
+            (*re, *im) = cos_sin(tone.frequency.phase(ns));
+        }
+    }
+
+    /// The slot's phasor of table row `k`.
+    pub(crate) fn slot_phasor(&self, k: usize, slot: usize) -> Complex {
+        Complex::new(
+            self.slot_re[k * self.slots + slot],
+            self.slot_im[k * self.slots + slot],
+        )
+    }
+
+    /// A modulated tone's exact phasors at the samples of one slot, into the scratch rows, and their times
+    /// into `row_t`: its phase is no product of frame and slot.
+    fn own_phasors(&mut self, tone: &Tone, slot: usize) {
+        let n = self.frames;
+        let (ns, t) = (self.slot_ns[slot], self.slot_t[slot]);
+        for i in 0..n {
+            let at = self.frame_t[i] + t;
+            let phase = tone
+                .frequency
+                .phase(self.frame_ns[i].wrapping_add(ns))
+                .wrapping_add(turns(0.5 * tone.chirp * at * at));
+            (self.own_re[i], self.own_im[i]) = cos_sin(phase);
+            self.row_t[i] = at;
+        }
+    }
+
+    /// Leaves the weighted residual of one slot, its mean removed, in `row`; returns its weighted sum of squares.
+    ///
+    /// Removing the mean is the projection off the slot's unknown offset.
+    pub(crate) fn residual(&mut self, slot: usize, tones: &[Tone], drift: [f32; 2]) -> f32 {
+        let n = self.frames;
+        let here = slot * n..slot * n + n;
+        let at = self.slot_t[slot];
+        let (linear, square) = (drift[0] + 2.0 * drift[1] * at, drift[1]);
+        for ((r, &x), &t) in self.row[..n]
+            .iter_mut()
+            .zip(&self.shift_px[here.clone()])
+            .zip(&self.frame_t[..n])
+        {
+            *r = x - t * (linear + square * t);
+        }
+        for (i, tone) in tones.iter().enumerate() {
+            if tone.modulated {
+                self.own_phasors(tone, slot);
+                let a = tone.amplitude;
+                for i in 0..n {
+                    let grown = 1.0 + tone.growth * self.row_t[i];
+                    self.row[i] -= grown * (a.re * self.own_re[i] + a.im * self.own_im[i]);
+                }
+                continue;
+            }
+            let k = i + 1;
+            let g = tone.amplitude * self.slot_phasor(k, slot).conj();
+            let re = &self.frame_re[k * n..k * n + n];
+            let im = &self.frame_im[k * n..k * n + n];
+            for ((r, &p), &q) in self.row[..n].iter_mut().zip(re).zip(im) {
+                *r -= g.re * p + g.im * q;
+            }
+            if let Some(step_ns) = self.skew_ns {
+                let w = core::f32::consts::TAU * tone.frequency.hz() * 1e-9 * step_ns;
+                let skew = &self.skew[here.clone()];
+                for (((r, &p), &q), &d) in self.row[..n].iter_mut().zip(re).zip(im).zip(skew) {
+                    *r -= w * f32::from(d) * (g.im * p - g.re * q);
+                }
+            }
+        }
+        let weight = &self.weight[here];
+        let row = &mut self.row[..n];
+        let total = self.slot_weight[slot];
+        let mean = if total > 0.0 {
+            weighted_sum(weight, row) / total
+        } else {
+            0.0
+        };
+        center(weight, row, mean)
+    }
+
+    /// One pass: the residual's weighted sum of squares, its products with the drift (t, t²) and the moments of
+    /// every tone.
+    pub(crate) fn pass(
+        &mut self,
+        tones: &[Tone],
+        drift: [f32; 2],
+        moments: &mut [Moments; MAX_PEAKS],
+    ) -> (f32, [f32; 2]) {
+        let n = self.frames;
+        let mut squares = 0.0;
+        let mut slow = [0.0_f32; 2];
+        *moments = [[Complex::new(0.0, 0.0); POWERS]; MAX_PEAKS];
+        for slot in 0..self.slots {
+            if self.slot_weight[slot] <= 0.0 {
+                continue;
+            }
+            squares += self.residual(slot, tones, drift);
+            let t = self.slot_t[slot];
+            for (i, tone) in tones.iter().enumerate() {
+                if !tone.modulated {
+                    continue;
+                }
+                self.own_phasors(tone, slot);
+                let mut sums = [Complex::new(0.0, 0.0); POWERS];
+                for i in 0..n {
+                    let at = self.row_t[i];
+                    let product = Complex::new(self.own_re[i], self.own_im[i]).scale(self.row[i]);
+                    sums[0] += product;
+                    sums[1] += product.scale(at);
+                    sums[2] += product.scale(at * at);
+                }
+                for (m, s) in moments[i].iter_mut().zip(sums) {
+                    *m += s;
+                }
+            }
+            for ((rt, &r), &t) in self.row_t[..n]
+                .iter_mut()
+                .zip(&self.row[..n])
+                .zip(&self.frame_t[..n])
+            {
+                *rt = r * t;
+            }
+            let (row, row_t) = (&self.row[..n], &self.row_t[..n]);
+            let first: f32 = sum(row_t);
+            let second: f32 = dot(row_t, &self.frame_t[..n]);
+            slow[0] += first;
+            slow[1] += second + 2.0 * t * first;
+            for (i, tone) in tones.iter().enumerate() {
+                if tone.modulated {
+                    continue;
+                }
+                let k = i + 1;
+                let re = &self.frame_re[k * n..k * n + n];
+                let im = &self.frame_im[k * n..k * n + n];
+                let q = self.slot_phasor(k, slot);
+                let (zero, one) = products(row, row_t, re, im);
+                let m = &mut moments[i];
+                m[0] += q * zero;
+                m[1] += q * (one + zero.scale(t));
+            }
+        }
+        (squares, slow)
+    }
+}
+
+/// Σ row·(re + i·im) and Σ row_t·(re + i·im).
+fn products(row: &[f32], row_t: &[f32], re: &[f32], im: &[f32]) -> (Complex, Complex) {
+    let mut sums = [[0.0_f32; LANES]; 4];
+    let whole = row.len() / LANES * LANES;
+    let chunks = row
+        .chunks_exact(LANES)
+        .zip(row_t.chunks_exact(LANES))
+        .zip(re.chunks_exact(LANES).zip(im.chunks_exact(LANES)));
+    for ((r, rt), (p, q)) in chunks {
+        for l in 0..LANES {
+            sums[0][l] += r[l] * p[l];
+            sums[1][l] += r[l] * q[l];
+            sums[2][l] += rt[l] * p[l];
+            sums[3][l] += rt[l] * q[l];
+        }
+    }
+    let mut total = sums.map(|s| s.iter().sum::<f32>());
+    for i in whole..row.len() {
+        total[0] += row[i] * re[i];
+        total[1] += row[i] * im[i];
+        total[2] += row_t[i] * re[i];
+        total[3] += row_t[i] * im[i];
+    }
+    (
+        Complex::new(total[0], total[1]),
+        Complex::new(total[2], total[3]),
+    )
+}
+
+fn sum(a: &[f32]) -> f32 {
+    let mut sums = [0.0_f32; LANES];
+    let chunks = a.chunks_exact(LANES);
+    let rest: f32 = chunks.remainder().iter().sum();
+    for c in chunks {
+        for l in 0..LANES {
+            sums[l] += c[l];
+        }
+    }
+    sums.iter().sum::<f32>() + rest
+}
+
+fn dot(a: &[f32], b: &[f32]) -> f32 {
+    let mut sums = [0.0_f32; LANES];
+    let (ca, cb) = (a.chunks_exact(LANES), b.chunks_exact(LANES));
+    let rest: f32 = ca
+        .remainder()
+        .iter()
+        .zip(cb.remainder())
+        .map(|(x, y)| x * y)
+        .sum();
+    for (x, y) in ca.zip(cb) {
+        for l in 0..LANES {
+            sums[l] += x[l] * y[l];
+        }
+    }
+    sums.iter().sum::<f32>() + rest
+}
+
+fn weighted_sum(weight: &[u16], row: &[f32]) -> f32 {
+    let mut sums = [0.0_f32; LANES];
+    let (cw, cr) = (weight.chunks_exact(LANES), row.chunks_exact(LANES));
+    let rest: f32 = cw
+        .remainder()
+        .iter()
+        .zip(cr.remainder())
+        .map(|(&w, r)| unpack_weight(w) * r)
+        .sum();
+    for (w, r) in cw.zip(cr) {
+        for l in 0..LANES {
+            sums[l] += unpack_weight(w[l]) * r[l];
+        }
+    }
+    sums.iter().sum::<f32>() + rest
+}
+
+/// Takes `mean` off the row and multiplies by the weights; returns the weighted sum of squares.
+fn center(weight: &[u16], row: &mut [f32], mean: f32) -> f32 {
+    let mut sums = [0.0_f32; LANES];
+    let mut cw = weight.chunks_exact(LANES);
+    let mut cr = row.chunks_exact_mut(LANES);
+    for (w, r) in (&mut cw).zip(&mut cr) {
+        for l in 0..LANES {
+            let x = r[l] - mean;
+            let y = x * unpack_weight(w[l]);
+            sums[l] += x * y;
+            r[l] = y;
+        }
+    }
+    let mut total = sums.iter().sum::<f32>();
+    for (&w, r) in cw.remainder().iter().zip(cr.into_remainder()) {
+        let x = *r - mean;
+        *r = x * unpack_weight(w);
+        total += x * *r;
+    }
+    total
+}

@@ -1,0 +1,145 @@
+//! The memory that the collecting and the computing side work in, lent by the caller.
+
+use super::window::{FrameMark, SampleBuffer};
+
+/// Rows of [`EstimatorStorage::frame_rows`]: time, weight and four of scratch.
+pub(crate) const FRAME_ROWS: usize = 6;
+
+/// Rows of [`EstimatorStorage::slot_rows`]: time and weight.
+pub(crate) const SLOT_ROWS: usize = 2;
+
+/// What [`super::Estimator`] works in. F: frames a window, S: slots a frame.
+#[derive(Debug)]
+pub struct EstimatorStorage<'a> {
+    /// The window being computed: S·F samples.
+    pub samples: SampleBuffer<'a>,
+    /// F frame times.
+    pub frame_ns: &'a mut [i64],
+    /// S slot times.
+    pub slot_ns: &'a mut [i64],
+    /// 6·F.
+    pub frame_rows: &'a mut [f32],
+    /// 2·S.
+    pub slot_rows: &'a mut [f32],
+    /// Phasors of tones at frames: 2·F·(tones + 1).
+    pub frame_phasors: &'a mut [f32],
+    /// Phasors of tones at slots: 2·S·(tones + 1).
+    pub slot_phasors: &'a mut [f32],
+    /// The transform's grid: 64 to 32 768 points, the largest power of two that fits is used.
+    pub grid: &'a mut [f32],
+}
+
+/// All that an [`crate::analyzer::Analyzer`] works in.
+#[derive(Debug)]
+pub struct Storage<'a> {
+    /// Samples as they come.
+    pub collected: SampleBuffer<'a>,
+    /// The computing side's.
+    pub estimator: EstimatorStorage<'a>,
+}
+
+/// Arrays of fixed size for [`Storage`]: a `static` on a microcontroller, a local in a test.
+///
+/// `ROWS` is the most tones fitted at once, and one. `StaticStorage<4096, 96, 96, 8192, 13>` takes about 125 KiB: twice
+/// 32 KiB of samples, 32 KiB of grid, the rest tables.
+///
+/// ```
+/// use rowtone::spectrum::StaticStorage;
+/// let mut storage = Box::new(StaticStorage::<4096, 96, 96, 8192, 9>::new());
+/// assert!(core::mem::size_of_val(&*storage) < 120 * 1024);
+/// let storage = storage.lend();
+/// assert_eq!(storage.estimator.grid.len(), 8192);
+/// ```
+#[derive(Clone, Debug)]
+pub struct StaticStorage<
+    const SAMPLES: usize,
+    const FRAMES: usize,
+    const SLOTS: usize,
+    const GRID: usize,
+    const ROWS: usize,
+> {
+    shift_px: [[f32; SAMPLES]; 2],
+    weight: [[u16; SAMPLES]; 2],
+    skew: [[i16; SAMPLES]; 2],
+    frames: [[FrameMark; FRAMES]; 2],
+    frame_ns: [i64; FRAMES],
+    slot_ns: [i64; SLOTS],
+    frame_rows: [[f32; FRAMES]; FRAME_ROWS],
+    slot_rows: [[f32; SLOTS]; SLOT_ROWS],
+    frame_phasors: [[[f32; FRAMES]; 2]; ROWS],
+    slot_phasors: [[[f32; SLOTS]; 2]; ROWS],
+    grid: [f32; GRID],
+}
+
+impl<
+    const SAMPLES: usize,
+    const FRAMES: usize,
+    const SLOTS: usize,
+    const GRID: usize,
+    const ROWS: usize,
+> StaticStorage<SAMPLES, FRAMES, SLOTS, GRID, ROWS>
+{
+    /// Empty memory.
+    pub const fn new() -> Self {
+        Self {
+            shift_px: [[0.0; SAMPLES]; 2],
+            weight: [[0; SAMPLES]; 2],
+            skew: [[0; SAMPLES]; 2],
+            frames: [[FrameMark {
+                number: 0,
+                start_ns: 0,
+            }; FRAMES]; 2],
+            frame_ns: [0; FRAMES],
+            slot_ns: [0; SLOTS],
+            frame_rows: [[0.0; FRAMES]; FRAME_ROWS],
+            slot_rows: [[0.0; SLOTS]; SLOT_ROWS],
+            frame_phasors: [[[0.0; FRAMES]; 2]; ROWS],
+            slot_phasors: [[[0.0; SLOTS]; 2]; ROWS],
+            grid: [0.0; GRID],
+        }
+    }
+
+    /// Lends all of it.
+    pub const fn lend(&mut self) -> Storage<'_> {
+        let [shift_a, shift_b] = &mut self.shift_px;
+        let [weight_a, weight_b] = &mut self.weight;
+        let [skew_a, skew_b] = &mut self.skew;
+        let [frames_a, frames_b] = &mut self.frames;
+        Storage {
+            collected: SampleBuffer {
+                shift_px: shift_a,
+                weight: weight_a,
+                skew: skew_a,
+                frames: frames_a,
+            },
+            estimator: EstimatorStorage {
+                samples: SampleBuffer {
+                    shift_px: shift_b,
+                    weight: weight_b,
+                    skew: skew_b,
+                    frames: frames_b,
+                },
+                frame_ns: &mut self.frame_ns,
+                slot_ns: &mut self.slot_ns,
+                frame_rows: self.frame_rows.as_flattened_mut(),
+                slot_rows: self.slot_rows.as_flattened_mut(),
+                frame_phasors: self.frame_phasors.as_flattened_mut().as_flattened_mut(),
+                slot_phasors: self.slot_phasors.as_flattened_mut().as_flattened_mut(),
+                grid: &mut self.grid,
+            },
+        }
+    }
+}
+
+impl<
+    const SAMPLES: usize,
+    const FRAMES: usize,
+    const SLOTS: usize,
+    const GRID: usize,
+    const ROWS: usize,
+> Default for StaticStorage<SAMPLES, FRAMES, SLOTS, GRID, ROWS>
+{
+    fn default() -> Self {
+        Self::new()
+    }
+}

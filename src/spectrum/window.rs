@@ -1,0 +1,91 @@
+//! The samples of one window as a matrix: a row a slot, a column a frame.
+//!
+//! Sample times are sums, t(n, s) = t_n + τ_s: frame n begins at t_n, slot s is exposed τ_s later. So the
+//! phasor of a tone at a sample is a product of one a frame and one a slot, and a pass over the samples
+//! costs two multiplications a tone. What is left of a sample's own time (rows of a group weigh
+//! differently from frame to frame) is its skew, kept in small steps and applied to first order.
+
+use crate::timeline::{Group, Sample};
+
+/// Samples as they are collected: shift, weight and skew, 8 bytes a sample.
+#[derive(Debug)]
+pub struct SampleBuffer<'a> {
+    /// Shifts, px.
+    pub shift_px: &'a mut [f32],
+    /// Weights, the upper half of an `f32`'s bits; 0 where there is no sample.
+    pub weight: &'a mut [u16],
+    /// Time beyond that of frame and slot, in steps of the skew unit.
+    pub skew: &'a mut [i16],
+    /// The frames.
+    pub frames: &'a mut [FrameMark],
+}
+
+/// One frame of a [`SampleBuffer`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct FrameMark {
+    /// Number of the frame, counted by the camera.
+    pub number: u32,
+    /// Start of exposure of its first row, ns on the camera's clock.
+    pub start_ns: i64,
+}
+
+impl SampleBuffer<'_> {
+    /// How many frames of `slots` samples fit.
+    pub(crate) fn frame_capacity(&self, slots: usize) -> usize {
+        let samples = self
+            .shift_px
+            .len()
+            .min(self.weight.len())
+            .min(self.skew.len());
+        (samples / slots.max(1)).min(self.frames.len())
+    }
+}
+
+/// The upper half of the bits: 8 significant bits are plenty for a weight.
+pub(crate) fn pack_weight(weight: f32) -> u16 {
+    if weight > 0.0 && weight.is_finite() {
+        ((weight.to_bits().saturating_add(0x8000) >> 16) as u16).min(0x7f00)
+    } else {
+        0
+    }
+}
+
+/// Back from [`pack_weight`].
+pub(crate) fn unpack_weight(weight: u16) -> f32 {
+    f32::from_bits(u32::from(weight) << 16)
+}
+
+/// Steps in which the skew is kept, ns: a whole group is 16 384 steps or less.
+pub(crate) fn skew_unit_ns(group: &Group) -> i64 {
+    group.spacing_ns() / 16_384 + 1
+}
+
+/// A sample's time beyond that of its frame and slot, in skew units; saturates.
+pub(crate) fn skew_of(group: &Group, sample: &Sample, start_ns: i64) -> i16 {
+    let late = sample
+        .time_ns
+        .saturating_sub(start_ns)
+        .saturating_sub(group.middle_ns(sample.slot));
+    (late / skew_unit_ns(group)).clamp(i64::from(i16::MIN), i64::from(i16::MAX)) as i16
+}
+
+/// What a window is, apart from its samples.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct WindowMark {
+    /// Number of the window, from 0.
+    pub seq: u32,
+    /// Start of the first frame that may be in it, ns on the camera's clock.
+    pub start_ns: i64,
+    /// End of the window: start of the first frame that may not be in it, ns on the camera's clock.
+    pub end_ns: i64,
+    /// The camera's clock when the stream began, ns.
+    pub origin_ns: i64,
+    /// Frames in it.
+    pub frames: u16,
+    /// Frames missing in it, by their numbers.
+    pub lost_frames: u16,
+    /// Rows measured in it.
+    pub lines: u32,
+    /// Shorter than asked for.
+    pub short: bool,
+}
