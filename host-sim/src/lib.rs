@@ -14,6 +14,7 @@
 pub mod commands;
 pub mod failure;
 pub mod input;
+pub mod memory;
 pub mod output;
 pub mod serial;
 pub mod sim;

@@ -9,6 +9,11 @@
 //! residual, tested against the energy that is left of them once every slot's unknown offset is projected away, and all
 //! are refined together at the samples' exact times. The search ends at a false-alarm level.
 
+#![allow(
+    clippy::needless_range_loop,
+    reason = "rows and columns of matrices are told apart by their indices"
+)]
+
 mod alarm;
 mod cholesky;
 mod config;
