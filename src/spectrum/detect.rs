@@ -80,6 +80,9 @@ pub(crate) fn candidates(
     let Some(points) = grid.get_mut(..g.points) else {
         return found;
     };
+    for (i, tone) in model.tones.iter().enumerate() {
+        samples.tabulate(i + 1, tone);
+    }
     spread(samples, model, points, g);
     let Some(bins) = transform(points) else {
         return found;

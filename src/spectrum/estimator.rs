@@ -308,7 +308,7 @@ impl<'a> Estimator<'a> {
             tones.sample_noise_px = 0.0;
             tones.row_noise_px = 0.0;
         }
-        let regressors = self.fit.weigh(&samples, &self.model);
+        let regressors = self.fit.weigh(&mut samples, &self.model);
         let low = self.config.min_hz.unwrap_or(0.0);
         let high = self.config.max_hz.unwrap_or(f32::INFINITY);
         let mut list: heapless::Vec<(Peak, f32), MAX_PEAKS> = heapless::Vec::new();

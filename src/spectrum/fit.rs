@@ -64,6 +64,11 @@ impl Fit {
         samples.count as f32 - (slots + drift_powers(samples) + fitted) as f32
     }
 
+    /// How much of the residual of the last pass is at tone `i` (squared).
+    pub(crate) fn held(&self, i: usize) -> f32 {
+        self.moments.get(i).map_or(0.0, |m| m[0].norm_sqr())
+    }
+
     /// The residual of `model` and its moments.
     pub(crate) fn evaluate(&mut self, samples: &mut Samples<'_>, model: &mut Model) -> [f32; 2] {
         for (i, tone) in model.tones.iter().enumerate() {
@@ -157,8 +162,11 @@ impl Fit {
         }
     }
 
-    /// Prepares [`Fit::deviation`] for a model whose tables are current.
-    pub(crate) fn weigh(&mut self, samples: &Samples<'_>, model: &Model) -> Regressors {
+    /// Prepares [`Fit::deviation`]; leaves the tables at `model`.
+    pub(crate) fn weigh(&mut self, samples: &mut Samples<'_>, model: &Model) -> Regressors {
+        for (i, tone) in model.tones.iter().enumerate() {
+            samples.tabulate(i + 1, tone);
+        }
         let regressors = Regressors::of(&model.tones, drift_powers(samples));
         samples.normal(&regressors, &model.tones, &mut self.normal);
         self.normal.factor();

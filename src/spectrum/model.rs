@@ -88,6 +88,13 @@ pub(crate) struct Samples<'a> {
 }
 
 impl Samples<'_> {
+    /// Tones the tables have room for.
+    pub(crate) fn most_tones(&self) -> usize {
+        let frames = self.frame_re.len() / self.frames.max(1);
+        let slots = self.slot_re.len() / self.slots.max(1);
+        frames.min(slots).min(TABLE_ROWS).saturating_sub(1)
+    }
+
     /// Fills table row `k` for `tone`.
     pub(crate) fn tabulate(&mut self, k: usize, tone: &Tone) {
         let n = self.frames;

@@ -1,5 +1,7 @@
 //! One more tone at a time, until the next is no more than noise would be.
 
+use microfft::Complex32 as Complex;
+
 use super::alarm;
 use super::detect::{self, Band, Candidate, LEAST_KEPT};
 use super::fit::{Fit, Model};
@@ -10,6 +12,9 @@ const STEPS: u32 = 8;
 
 /// Tones nearer than this are one, turns a window length.
 const CLOSEST: f32 = 0.7;
+
+/// Where the ghosts of a tone are, in frame rates from it.
+const GHOSTS: [f32; 4] = [1.0, -1.0, 2.0, -2.0];
 
 /// How the search is to be done.
 #[derive(Clone, Copy, Debug)]
@@ -136,26 +141,11 @@ impl Search {
         };
         let mut changed = false;
         for i in 0..model.tones.len() {
+            let ghosts = self.ghosts(samples, fit, model, i, fps);
             let mut without = model.clone();
-            let tone = without.tones.swap_remove(i);
-            for k in [1.0, -1.0, 2.0, -2.0] {
-                let frequency = tone.frequency.plus(k * fps);
-                let hz = frequency.hz();
-                if hz < self.band.lowest_hz || hz > self.band.highest_hz {
-                    continue;
-                }
-                if without
-                    .tones
-                    .iter()
-                    .any(|t| t.frequency.above(frequency).abs() * samples.length_s < CLOSEST)
-                {
-                    continue;
-                }
-                let candidate = Candidate {
-                    frequency,
-                    gain: 0.0,
-                };
-                if let Some(trial) = self.try_tone(samples, fit, &without, &candidate)
+            without.tones.swap_remove(i);
+            for candidate in &ghosts {
+                if let Some(trial) = self.try_tone(samples, fit, &without, candidate)
                     && trial.squares < 0.9999 * model.squares
                 {
                     *model = trial;
@@ -164,8 +154,53 @@ impl Search {
                 }
             }
         }
-        fit.refine(samples, model, 1);
         changed
+    }
+
+    /// Places k frame rates from tone `i` where, without it, the residual holds at least half as much as at its own.
+    fn ghosts(
+        &self,
+        samples: &mut Samples<'_>,
+        fit: &mut Fit,
+        model: &Model,
+        i: usize,
+        fps: f32,
+    ) -> heapless::Vec<Candidate, { GHOSTS.len() }> {
+        let mut ghosts = heapless::Vec::new();
+        let mut probes = model.clone();
+        let Some(tone) = probes.tones.get_mut(i) else {
+            return ghosts;
+        };
+        let own = tone.frequency;
+        tone.amplitude = Complex::new(0.0, 0.0);
+        tone.modulated = false;
+        let first = probes.tones.len();
+        for k in GHOSTS {
+            let frequency = own.plus(k * fps);
+            let hz = frequency.hz();
+            let within = hz > self.band.lowest_hz && hz < self.band.highest_hz;
+            let free = model
+                .tones
+                .iter()
+                .all(|t| t.frequency.above(frequency).abs() * samples.length_s > CLOSEST);
+            if within && free && first + ghosts.len() < samples.most_tones() {
+                let _ = probes.tones.push(Tone::steady(frequency));
+                let _ = ghosts.push(Candidate {
+                    frequency,
+                    gain: 0.0,
+                });
+            }
+        }
+        if ghosts.is_empty() {
+            return ghosts;
+        }
+        fit.evaluate(samples, &mut probes);
+        let here = fit.held(i);
+        for (j, ghost) in ghosts.iter_mut().enumerate() {
+            ghost.gain = fit.held(first + j);
+        }
+        ghosts.retain(|g| g.gain > 0.5 * here);
+        ghosts
     }
 
     /// Drops tones that no longer lower the sum of squares enough beside the others.
