@@ -11,6 +11,7 @@
 //! - [`tracking`]: frames to displacements.
 //! - [`sim`]: a simulated rolling-shutter camera, with the truth about what it saw.
 
+pub mod analysis;
 pub mod commands;
 pub mod failure;
 pub mod input;

@@ -12,6 +12,7 @@ use clap::{Parser, Subcommand};
 
 use crate::failure::Failure;
 
+pub mod analyze;
 pub mod demo;
 pub mod displacement;
 pub mod monitor;
@@ -35,6 +36,8 @@ struct Cli {
 enum Command {
     /// A simulated camera looks at a simulated machine; its peaks appear beside the truth
     Demo(demo::Args),
+    /// Says what vibrates, window by window
+    Analyze(analyze::Args),
     /// Writes the motion over time as CSV, NPY or WAV
     Displacement(displacement::Args),
     /// Decodes what a board sends over a serial port
@@ -46,6 +49,7 @@ enum Command {
 fn run(command: &Command) -> Result<(), Failure> {
     match command {
         Command::Demo(args) => demo::run(args),
+        Command::Analyze(args) => analyze::run(args),
         Command::Displacement(args) => displacement::run(args),
         Command::Monitor(args) => monitor::run(args),
         Command::Simulate(args) => simulate::run(args),

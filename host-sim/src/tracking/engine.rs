@@ -58,6 +58,14 @@ pub struct Unmeasured {
     pub learning: u32,
 }
 
+impl std::ops::AddAssign for Unmeasured {
+    fn add_assign(&mut self, other: Self) {
+        self.no_texture += other.no_texture;
+        self.disturbed += other.disturbed;
+        self.learning += other.learning;
+    }
+}
+
 /// A tracker on one part of the picture.
 #[derive(Debug)]
 pub struct Engine<'a> {

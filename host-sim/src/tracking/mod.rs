@@ -23,8 +23,8 @@ use crate::input::{Camera, Feed, Frame, Rect};
 const LEARN_FRAMES: usize = 30;
 /// Fewer where they are so large that keeping them would take more than this, bytes of luma.
 const LEARN_BYTES: usize = 512 << 20;
-/// Frames of displacements on their way.
-const QUEUE: usize = 4;
+/// Frames of displacements on their way: the lines go on while a report is computed.
+const QUEUE: usize = 32;
 
 /// What the lines of one frame came to.
 #[derive(Debug, Default)]

@@ -55,23 +55,14 @@ pub struct Picture {
 
 impl Picture {
     /// Starts a picture.
-    ///
-    /// # Errors
-    /// [`Failure::Usage`] when the file's ending is neither `.svg` nor `.png`.
-    pub fn new(settings: Settings) -> Result<Self, Failure> {
-        if ending(&settings.path).is_none() {
-            return Err(Failure::usage(format!(
-                "--plot {}: want a file that ends in .svg or .png",
-                settings.path.display()
-            )));
-        }
-        Ok(Self {
+    pub fn new(settings: Settings) -> Self {
+        Self {
             settings,
             start_ns: None,
             samples: VecDeque::new(),
             spectrogram: Spectrogram::default(),
             last: None,
-        })
+        }
     }
 
     /// Says when the recording started, ns: reports count from there.
@@ -164,6 +155,20 @@ impl Picture {
         };
         std::fs::write(path, bytes)
             .map_err(|error| Failure::writing(&path.display().to_string(), &error))
+    }
+}
+
+/// Whether a picture of this name can be drawn.
+///
+/// # Errors
+/// [`Failure::Usage`] when its ending is neither `.svg` nor `.png`.
+pub fn check_ending(path: &Path) -> Result<(), Failure> {
+    match ending(path) {
+        Some(_) => Ok(()),
+        None => Err(Failure::usage(format!(
+            "--plot {}: want a file that ends in .svg or .png",
+            path.display()
+        ))),
     }
 }
 
