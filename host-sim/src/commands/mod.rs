@@ -13,6 +13,7 @@ use clap::{Parser, Subcommand};
 use crate::failure::Failure;
 
 pub mod analyze;
+pub mod calibrate;
 pub mod demo;
 pub mod displacement;
 pub mod monitor;
@@ -44,6 +45,8 @@ enum Command {
     Monitor(monitor::Args),
     /// Writes a simulated clip, with the truth beside it
     Simulate(simulate::Args),
+    /// Line time, read-out, blank time and exposure of a camera, from a flashing light
+    Calibrate(calibrate::Args),
 }
 
 fn run(command: &Command) -> Result<(), Failure> {
@@ -53,6 +56,7 @@ fn run(command: &Command) -> Result<(), Failure> {
         Command::Displacement(args) => displacement::run(args),
         Command::Monitor(args) => monitor::run(args),
         Command::Simulate(args) => simulate::run(args),
+        Command::Calibrate(args) => calibrate::run(args),
     }
 }
 
