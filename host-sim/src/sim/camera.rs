@@ -295,6 +295,12 @@ impl Camera {
             texture.add(y, moving.clone(), moved, &mut levels[moving.clone()]);
             texture.add(y, moving.end..cols, still, &mut levels[moving.end..]);
         }
+        if let Some(uneven) = config.light.at_place(cols, y, config.sensor.rows as usize) {
+            levels
+                .iter_mut()
+                .enumerate()
+                .for_each(|(x, v)| *v *= uneven(x) as f32);
+        }
         if let Some(hand) = &config.disturbances.hand {
             cover(hand, from_s + 0.5 * exposure_s, seen.light as f32, levels);
         }

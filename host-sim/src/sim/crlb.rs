@@ -45,11 +45,15 @@ fn row_bound_px(camera: &Camera, row: u32) -> Option<f64> {
     let levels = camera.texture().row(y, cols.clone(), 0.0);
     let slopes = camera.texture().slope(y, cols);
     let white = config.sensor.white_dn();
+    let (all, rows) = (config.sensor.cols as usize, config.sensor.rows as usize);
+    let uneven = config.light.at_place(all, y, rows);
     let mut information = 0.0;
     for ((level, slope), x) in levels.iter().zip(slopes).zip(first..) {
-        if *level < 1.0 && !disturbed.dead_cols.contains(&x) {
-            information +=
-                (f64::from(slope) * white).powi(2) / camera.pixels().variance_dn2(*level);
+        let light = uneven.as_ref().map_or(1.0, |f| f(x as usize));
+        let level = light as f32 * level;
+        if level < 1.0 && !disturbed.dead_cols.contains(&x) {
+            let slope_dn = f64::from(slope) * light * white;
+            information += slope_dn * slope_dn / camera.pixels().variance_dn2(level);
         }
     }
     // Less than this is the rounding of the texture, not texture.

@@ -78,6 +78,9 @@ pub struct Light {
     pub led: Option<Led>,
     /// Factors from given times on.
     pub steps: Vec<Step>,
+    /// Uneven light: by how much more, relative to the middle, it is at the right edge than at the
+    /// left, and at the bottom than at the top; -2 to 2.
+    pub gradient: [f64; 2],
 }
 
 impl Light {
@@ -91,7 +94,16 @@ impl Light {
 
     /// It never changes.
     pub fn is_steady(&self) -> bool {
-        *self == Self::default()
+        self.flicker.is_none() && self.led.is_none() && self.steps.is_empty()
+    }
+
+    /// Light at a place in the picture, relative to its middle; `None` when it is even.
+    pub fn at_place(&self, cols: usize, row: usize, rows: usize) -> Option<impl Fn(usize) -> f64> {
+        let [across, down] = self.gradient;
+        let share = |k: usize, n: usize| k as f64 / (n.max(2) - 1) as f64 - 0.5;
+        let here = 1.0 + down * share(row, rows);
+        (self.gradient != [0.0; 2])
+            .then_some(move |col| (here + across * share(col, cols)).max(0.0))
     }
 
     /// Highest frequency of its smooth part, Hz.
@@ -173,6 +185,14 @@ impl Light {
                 "a factor from 0 to 1000",
             )?;
         }
+        for g in self.gradient {
+            check(
+                (-2.0..=2.0).contains(&g),
+                "the light's gradient",
+                g,
+                "-2 to 2",
+            )?;
+        }
         check_steps(&self.steps)
     }
 }
@@ -207,6 +227,18 @@ mod tests {
             .filter(|&k| light.at(f64::from(k) * 1e-6 + 5e-7) == 1.0)
             .count();
         assert!((2999..=3001).contains(&on), "{on}");
+    }
+
+    #[test]
+    fn a_gradient_is_one_in_the_middle_and_never_negative() {
+        let light = Light {
+            gradient: [0.5, -2.0],
+            ..Light::default()
+        };
+        let at = |x, y| light.at_place(101, y, 51).expect("uneven")(x);
+        assert_eq!((at(50, 25), at(100, 25), at(0, 25)), (1.0, 1.25, 0.75));
+        assert_eq!((at(50, 0), at(0, 50)), (2.0, 0.0));
+        assert!(Light::default().at_place(9, 0, 9).is_none());
     }
 
     #[test]

@@ -78,6 +78,14 @@ pub(super) fn led(text: &str) -> Result<Led, String> {
     })
 }
 
+pub(super) fn gradient(text: &str) -> Result<Gradient, String> {
+    numbers(text, ':', "ACROSS or ACROSS:DOWN", &[0.0]).map(Gradient)
+}
+
+/// How the light changes across and down the picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Gradient(pub(super) [f64; 2]);
+
 pub(super) fn late(text: &str) -> Result<(f64, f64), String> {
     let [share, us] = numbers(text, ':', "SHARE:MICROSECONDS", &[])?;
     Ok((share, us))

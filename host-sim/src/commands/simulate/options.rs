@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::forms::{self, Span};
+use super::forms::{self, Gradient, Span};
 use crate::failure::Failure;
 use crate::sim::{
     Chirp, Config, Flicker, Hand, Led, Optics, Preset, RateChange, Rect, Scene, Sensor, Sound,
@@ -170,6 +170,10 @@ struct LightOptions {
     /// Share of the flashes that fail to come
     #[arg(long, value_name = "SHARE", default_value = "0", requires = "led")]
     led_missing: f64,
+    /// Uneven light: how much more at the right than at the left, and at the bottom than at the top,
+    /// relative to the middle
+    #[arg(long, value_name = "ACROSS[:DOWN]", value_parser = forms::gradient, allow_hyphen_values = true)]
+    gradient: Option<Gradient>,
     /// Light from this time on, as a factor (may be repeated)
     #[arg(long, value_name = "S:FACTOR", value_parser = forms::step)]
     light_step: Vec<Step>,
@@ -250,6 +254,7 @@ impl Args {
             missing: self.light.led_missing,
             ..led
         });
+        config.light.gradient = self.light.gradient.map_or([0.0; 2], |g| g.0);
         config.light.steps.clone_from(&self.light.light_step);
         config.rate_changes.clone_from(&self.camera.hop);
         self.put_faults(&mut config);
