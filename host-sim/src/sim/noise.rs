@@ -98,8 +98,8 @@ mod tests {
     use crate::sim::Config;
     use crate::sim::schedule::stream;
 
-    /// Mean and variance follow the photon transfer curve from dark to near white. Of 200 000 pixels
-    /// the variance's estimate has a relative sd of 0.32 %; 1.6 % is five of them, so a false
+    /// Mean and variance follow the photon transfer curve from dark to near white. Of 100 000 pixels
+    /// the variance's estimate has a relative sd of 0.45 %; 2.3 % is five of them, so a false
     /// failure of one of the levels has a probability below 1e-5.
     #[test]
     fn variance_against_mean_is_the_photon_transfer_curve() {
@@ -115,14 +115,14 @@ mod tests {
             let pixels = Pixels::new(&sensor);
             for level in [0.003, 0.02, 0.1, 0.5, 0.9] {
                 let mut rng = stream(5, 9, bits.into());
-                let mut row = vec![level; 200_000];
+                let mut row = vec![level; 100_000];
                 pixels.read(&mut row, 1.0, &mut rng, &mut Vec::new());
-                let mean = row.iter().map(|&v| f64::from(v)).sum::<f64>() / 2e5;
+                let mean = row.iter().map(|&v| f64::from(v)).sum::<f64>() / 1e5;
                 let var = row
                     .iter()
                     .map(|&v| (f64::from(v) - mean).powi(2))
                     .sum::<f64>()
-                    / 2e5;
+                    / 1e5;
                 let want = pixels.variance_dn2(level);
                 let clipped = f64::from(level) * sensor.white_dn() < 4.0 * want.sqrt();
                 if !clipped {
@@ -131,7 +131,7 @@ mod tests {
                         "{mean}"
                     );
                     assert!(
-                        (var / want - 1.0).abs() < 0.016,
+                        (var / want - 1.0).abs() < 0.023,
                         "{bits} bits at {level}: {var} {want}"
                     );
                 }

@@ -4,7 +4,8 @@ use std::num::NonZeroUsize;
 use std::sync::mpsc::sync_channel;
 use std::thread;
 
-use super::camera::{Camera, Frame};
+use super::camera::Camera;
+use super::frame::Frame;
 
 /// Renders all arriving frames on `threads` threads and hands them to `sink` in order, a few ahead
 /// at most. Stops at the sink's first error. The frames are the same whatever the number of threads.

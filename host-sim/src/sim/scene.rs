@@ -1,15 +1,16 @@
 //! What the camera looks at: how much light each point reflects.
 
+mod fields;
+mod picture;
+
 use std::path::PathBuf;
 
-use rand_distr::{Distribution, StandardNormal};
-use rustfft::num_complex::Complex64;
-use rustfft::{FftDirection, FftPlannerScalar};
 use serde::Serialize;
 
 use super::error::{SimError, check};
-use super::schedule::stream;
 use super::texture::Strip;
+use fields::{blur_cols, blur_rows, noise, one_over_f};
+use picture::picture;
 
 /// The kinds of scene.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -135,11 +136,6 @@ fn speckle(period_px: usize, rows: usize, grain_px: f64, blur_px: f64, seed: u64
     }
 }
 
-fn noise(len: usize, seed: u64) -> Vec<f32> {
-    let mut rng = stream(seed, 2, 0);
-    (0..len).map(|_| StandardNormal.sample(&mut rng)).collect()
-}
-
 /// Bright boxes (start, end in px) on a dark ground, drawn with their exact share of each value.
 fn boxes(period_px: usize, rows: usize, in_row: impl Fn(usize) -> Vec<[f64; 2]>) -> Strip {
     let width = period_px * 2;
@@ -180,147 +176,6 @@ fn photo(period_px: usize, rows: usize, sky: f64, seed: u64) -> Strip {
         period_px,
         fineness: 1,
         values,
-    }
-}
-
-/// A periodic random field with amplitude 1/f^`power`, mean 0, standard deviation 1.
-fn one_over_f(width: usize, rows: usize, power: f64, seed: u64) -> Vec<f64> {
-    // Twice the height, so that top and bottom are strangers.
-    let height = rows * 2;
-    let mut field: Vec<Complex64> = noise(width * height, seed)
-        .iter()
-        .map(|&v| Complex64::new(f64::from(v), 0.0))
-        .collect();
-    transform(&mut field, width, height, FftDirection::Forward);
-    for (i, c) in field.iter_mut().enumerate() {
-        let turn = |k: usize, n: usize| k.min(n - k) as f64 / n as f64;
-        let (fx, fy) = (turn(i % width, width), turn(i / width, height));
-        let f2 = fx * fx + fy * fy;
-        let gain = if f2 > 0.0 {
-            libm::pow(f2, -0.5 * power)
-        } else {
-            0.0
-        };
-        *c *= gain;
-    }
-    transform(&mut field, width, height, FftDirection::Inverse);
-    let out: Vec<f64> = field.iter().take(width * rows).map(|c| c.re).collect();
-    let n = out.len() as f64;
-    let mean = out.iter().sum::<f64>() / n;
-    let sd = (out.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n)
-        .sqrt()
-        .max(1e-300);
-    out.iter().map(|v| (v - mean) / sd).collect()
-}
-
-/// Fourier transform over rows, then columns, in place.
-fn transform(field: &mut [Complex64], width: usize, height: usize, direction: FftDirection) {
-    let mut planner = FftPlannerScalar::new();
-    planner.plan_fft(width, direction).process(field);
-    let along = planner.plan_fft(height, direction);
-    let mut column = vec![Complex64::default(); height];
-    for x in 0..width {
-        for (c, row) in column.iter_mut().zip(field.chunks(width)) {
-            *c = row[x];
-        }
-        along.process(&mut column);
-        for (c, row) in column.iter().zip(field.chunks_mut(width)) {
-            row[x] = *c;
-        }
-    }
-}
-
-/// A picture scaled to the frame's height; what is missing in width is its mirror image, and the
-/// strip closes by fading its last part into its first.
-fn picture(path: &std::path::Path, period_px: usize, rows: usize) -> Result<Strip, SimError> {
-    let fail = |why: String| SimError::File {
-        path: path.display().to_string(),
-        why,
-    };
-    let reader = image::ImageReader::open(path).map_err(|e| fail(e.to_string()))?;
-    let reader = reader
-        .with_guessed_format()
-        .map_err(|e| fail(e.to_string()))?;
-    let grey = reader
-        .decode()
-        .map_err(|e| fail(e.to_string()))?
-        .into_luma16();
-    let (w, h) = grey.dimensions();
-    if w == 0 || h == 0 {
-        return Err(fail("the picture is empty".into()));
-    }
-    let width = ((f64::from(w) * rows as f64 / f64::from(h)).round() as u32).max(1);
-    let scaled = image::imageops::resize(
-        &grey,
-        width,
-        rows as u32,
-        image::imageops::FilterType::Triangle,
-    );
-    let fade = (period_px / 8).min(64);
-    let at = |x: usize, y: usize| {
-        let turn = 2 * width as usize;
-        let k = x % turn;
-        let k = if k < width as usize { k } else { turn - 1 - k };
-        f32::from(scaled.get_pixel(k as u32, y as u32).0[0]) / 65535.0
-    };
-    let mut values = Vec::with_capacity(period_px * rows);
-    for y in 0..rows {
-        for x in 0..period_px {
-            // The last columns fade into what lies left of the first, itself a mirror image.
-            let into = (x + fade + 1).saturating_sub(period_px) as f32 / (fade + 1) as f32;
-            values.push(at(x, y) * (1.0 - into) + at(period_px - 1 - x, y) * into);
-        }
-    }
-    Ok(Strip {
-        period_px,
-        fineness: 1,
-        values,
-    })
-}
-
-fn gaussian(sigma: f64) -> Vec<f32> {
-    let reach = (4.0 * sigma).ceil() as i64;
-    let weights: Vec<f64> = (-reach..=reach)
-        .map(|k| libm::exp(-0.5 * (k as f64 / sigma).powi(2)))
-        .collect();
-    let sum: f64 = weights.iter().sum();
-    weights.iter().map(|w| (w / sum) as f32).collect()
-}
-
-/// Gaussian blur along each row, around the end.
-fn blur_rows(values: &mut [f32], width: usize, sigma: f64) {
-    if sigma <= 0.0 {
-        return;
-    }
-    let taps = gaussian(sigma);
-    let reach = taps.len() / 2;
-    for row in values.chunks_mut(width) {
-        let source: Vec<f32> = (0..width + 2 * reach)
-            .map(|k| row[(k + width * (reach / width + 1) - reach) % width])
-            .collect();
-        for (v, near) in row.iter_mut().zip(source.windows(taps.len())) {
-            *v = near.iter().zip(&taps).map(|(a, b)| a * b).sum();
-        }
-    }
-}
-
-/// Gaussian blur down the columns; the first and last rows repeat beyond the edge.
-fn blur_cols(values: &mut [f32], width: usize, sigma: f64) {
-    if sigma <= 0.0 {
-        return;
-    }
-    let taps = gaussian(sigma);
-    let reach = taps.len() as i64 / 2;
-    let source = values.to_vec();
-    let last = (source.len() / width) as i64 - 1;
-    for (y, row) in values.chunks_mut(width).enumerate() {
-        row.fill(0.0);
-        for (k, t) in taps.iter().enumerate() {
-            let from = (y as i64 + k as i64 - reach).clamp(0, last) as usize * width;
-            for (v, s) in row.iter_mut().zip(&source[from..from + width]) {
-                *v += t * s;
-            }
-        }
     }
 }
 

@@ -2,8 +2,8 @@
 
 use std::io::{self, Write};
 
-use super::camera::{Frame, PixelBuffer};
 use super::config::Sensor;
+use super::frame::{Frame, PixelBuffer};
 use super::schedule::Slot;
 
 /// Writes the stream's header: mono, 8 bits or deeper (`mono10` and so on, little-endian words).
