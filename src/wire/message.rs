@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::report::Report;
 
 /// Longest text of a [`Reply`], bytes.
-pub const REPLY_LEN: usize = 160;
+pub const REPLY_LEN: usize = 240;
 
 /// Where the settings in use came from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -14,10 +14,12 @@ pub enum SettingsOrigin {
     Defaults,
     /// Read from the board's memory.
     Saved,
-    /// The built-in defaults, because what was saved is torn or corrupt.
+    /// The built-in defaults, because what was saved is torn, corrupt or not valid here.
     Corrupt,
     /// Changed over the line since the start and not saved.
     Changed,
+    /// Read from the board's memory, but from before the last save: that one was cut short.
+    Previous,
 }
 
 /// How the board itself is doing.

@@ -54,7 +54,7 @@ prop_compose! {
         (dropped_reports, refused_commands) in any::<(u32, u32)>(),
         settings in sample::select(vec![
             SettingsOrigin::Defaults, SettingsOrigin::Saved,
-            SettingsOrigin::Corrupt, SettingsOrigin::Changed,
+            SettingsOrigin::Corrupt, SettingsOrigin::Changed, SettingsOrigin::Previous,
         ]),
     ) -> Status {
         Status {

@@ -233,6 +233,7 @@ fn read_status(mut fields: Fields<'_>) -> Result<Status, DecodeError> {
             "S" => SettingsOrigin::Saved,
             "C" => SettingsOrigin::Corrupt,
             "M" => SettingsOrigin::Changed,
+            "P" => SettingsOrigin::Previous,
             _ => return Err(DecodeError::Field("settings")),
         },
     };
@@ -248,4 +249,11 @@ fn read_reply(ok: bool, mut fields: Fields<'_>) -> Result<Reply, DecodeError> {
     }
     let text = text.try_into().map_err(|_| DecodeError::Field("text"))?;
     Ok(Reply { ok, text })
+}
+
+/// The command in a `$RTCMD,…*hhhhhhhh` sentence, or `None` where it is not one or not intact.
+pub(crate) fn command_in_sentence(line: &str) -> Option<&str> {
+    let (body, sum) = line.strip_prefix('$')?.rsplit_once('*')?;
+    let intact = hexadecimal(sum, 8)? == CRC.checksum(body.as_bytes());
+    body.strip_prefix("RTCMD,").filter(|_| intact)
 }

@@ -95,6 +95,7 @@ fn write_status(status: &Status, out: &mut impl Write) -> fmt::Result {
         SettingsOrigin::Saved => 'S',
         SettingsOrigin::Corrupt => 'C',
         SettingsOrigin::Changed => 'M',
+        SettingsOrigin::Previous => 'P',
     };
     write!(
         out,
@@ -126,4 +127,19 @@ impl<W: Write> Write for Summed<'_, W> {
         self.digest.update(text.as_bytes());
         self.out.write_str(text)
     }
+}
+
+/// Writes a command as a `$RTCMD,…*hhhhhhhh` sentence, for programs that talk to a board.
+///
+/// # Errors
+/// Only where `out` refuses.
+pub fn encode_command(command: &str, out: &mut impl Write) -> fmt::Result {
+    out.write_char('$')?;
+    let mut body = Summed {
+        out,
+        digest: CRC.digest(),
+    };
+    write!(body, "RTCMD,{command}")?;
+    let sum = body.digest.finalize();
+    write!(out, "*{sum:08X}\r\n")
 }

@@ -33,8 +33,9 @@ mod decode;
 mod encode;
 mod fields;
 
+pub(crate) use decode::command_in_sentence;
 pub use decode::{DecodeError, Decoder, decode_line};
-pub use encode::{encode, encode_to_slice};
+pub use encode::{encode, encode_command, encode_to_slice};
 
 /// Decimals of each kind of value.
 pub mod resolution {
