@@ -84,6 +84,11 @@ impl Console {
         &self.settings
     }
 
+    /// What is fixed about the board.
+    pub fn board(&self) -> &Board {
+        &self.board
+    }
+
     /// Number of the session, as every report carries it.
     pub fn session(&self) -> u32 {
         self.session

@@ -37,7 +37,7 @@ pub enum Wire {
     Text,
     /// [`crate::wire::binary`]
     Binary,
-    /// Modbus RTU
+    /// [`crate::wire::modbus`]
     Modbus,
 }
 

@@ -6,6 +6,7 @@
 //! | --- | --- | --- |
 //! | [`text`] | one line of printable ASCII, `$RT…*` and a CRC-32 | people, scripts (default) |
 //! | [`binary`] | postcard, CRC-32 and COBS between zero bytes | slow lines, programs |
+//! | [`modbus`] | registers of a Modbus RTU server, asked for by a master | PLCs |
 //!
 //! Both directions are here, so what can be written can be read, and what is read has passed its
 //! checksum *and* every range check. Nothing allocates: encoders write into what the caller
@@ -16,6 +17,7 @@ pub mod binary;
 mod check;
 mod decimal;
 mod message;
+pub mod modbus;
 mod sequence;
 mod slice;
 pub mod text;

@@ -1,0 +1,73 @@
+//! Where a frame ends: silence.
+
+use heapless::Vec;
+
+use super::MAX_FRAME;
+
+/// Collects a frame from bytes and the times they came at.
+///
+/// A frame ends when the line was silent for 3.5 characters (1.75 ms above 19200 baud; *Modbus
+/// over Serial Line V1.02*, 2.5.1.1). Frames longer than [`MAX_FRAME`] are left out.
+///
+/// ```
+/// use rowtone::wire::modbus::FrameReader;
+///
+/// let mut reader = FrameReader::new(115_200);
+/// for (i, byte) in [1, 4, 0, 0, 0, 1, 0x31, 0xca].into_iter().enumerate() {
+///     reader.push(byte, 87 * i as u64);
+/// }
+/// assert_eq!(reader.frame(700), None);
+/// assert_eq!(reader.frame(3000).map(<[u8]>::len), Some(8));
+/// reader.clear();
+/// assert_eq!(reader.frame(5000), None);
+/// ```
+#[derive(Clone, Debug)]
+pub struct FrameReader {
+    frame: Vec<u8, MAX_FRAME>,
+    too_long: bool,
+    last_us: u64,
+    silence_us: u64,
+}
+
+impl FrameReader {
+    /// For a line of this speed, 11 bits a character.
+    pub const fn new(baud: u32) -> Self {
+        let silence_us = match baud {
+            0..=19_200 => 38_500_000 / if baud == 0 { 1 } else { baud as u64 },
+            _ => 1_750,
+        };
+        Self {
+            frame: Vec::new(),
+            too_long: false,
+            last_us: 0,
+            silence_us,
+        }
+    }
+
+    /// Takes a byte that came at `now_us`. A byte after a silence starts a new frame, also where
+    /// the one before was never asked for.
+    pub fn push(&mut self, byte: u8, now_us: u64) {
+        if self.silent(now_us) {
+            self.clear();
+        }
+        self.last_us = now_us;
+        self.too_long |= self.frame.push(byte).is_err();
+    }
+
+    /// The frame, once the silence behind it has lasted long enough. [`FrameReader::clear`] it
+    /// when it is answered.
+    pub fn frame(&self, now_us: u64) -> Option<&[u8]> {
+        let done = !self.frame.is_empty() && !self.too_long && self.silent(now_us);
+        done.then_some(self.frame.as_slice())
+    }
+
+    /// Forgets what came so far.
+    pub fn clear(&mut self) {
+        self.frame.clear();
+        self.too_long = false;
+    }
+
+    fn silent(&self, now_us: u64) -> bool {
+        now_us.saturating_sub(self.last_us) >= self.silence_us
+    }
+}
