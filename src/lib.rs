@@ -7,6 +7,7 @@ pub mod analyzer;
 pub mod band;
 pub mod camera;
 pub mod kernel;
+pub mod link;
 pub mod noise;
 pub mod outbox;
 mod pixel;

@@ -171,6 +171,15 @@ impl<'a> Outbox<'a> {
         Ok((from, to))
     }
 
+    /// The newest report, sent or not.
+    pub fn newest(&self) -> Option<&Report> {
+        let newest = self.next.wrapping_sub(u32::from(self.kept > 0));
+        let index = usize::try_from(newest)
+            .ok()?
+            .checked_rem(self.slots.len())?;
+        self.slots.get(index)?.as_ref().filter(|_| self.kept > 0)
+    }
+
     /// Number that the next report will get.
     pub fn next_seq(&self) -> u32 {
         self.next

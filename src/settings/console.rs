@@ -122,8 +122,13 @@ impl Console {
 
     /// Counts a line that was no command, and says what to answer.
     pub fn refuse(&mut self, error: &CommandError<'_>) -> Message {
-        self.refused = self.refused.saturating_add(1);
+        self.count_refused();
         reply(false, format_args!("{error}"))
+    }
+
+    /// Counts a line that is not even answered.
+    pub(crate) fn count_refused(&mut self) {
+        self.refused = self.refused.saturating_add(1);
     }
 
     /// How the board is doing.
