@@ -12,15 +12,12 @@
 //! - [`sim`]: a simulated rolling-shutter camera, with the truth about what it saw.
 
 pub mod analysis;
-pub mod commands;
-pub mod failure;
-pub mod input;
-pub mod memory;
 pub mod calibrate;
 pub mod commands;
 pub mod failure;
 pub mod input;
 pub mod linear;
+pub mod memory;
 pub mod output;
 pub mod serial;
 pub mod sim;
