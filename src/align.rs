@@ -6,7 +6,7 @@ use crate::{pixel::Pixel, reference::Recipe};
 const STILL_PX: f32 = 0.08;
 
 /// mean(x) ← mean(x)·(1 − keep) + p(x + shift)·share: `keep` = 1/n, `share` = keep / brightness. Between
-/// pixels by Lagrange's cubic; where the line does not reach, the mean stays.
+/// pixels by Lagrange's polynomial through six; where the line does not reach, the mean stays.
 pub(crate) fn average_in<P: Pixel>(
     mean: &mut [u16],
     pixels: &[P],
@@ -30,30 +30,57 @@ pub(crate) fn average_in<P: Pixel>(
     let stride = recipe.stride;
     let steps = shift_px / stride as f32;
     let whole = libm::floorf(steps);
-    let [a, b, c, d] = cubic(steps - whole);
+    let weights = lagrange(steps - whole);
     let offset = whole as isize * stride as isize;
-    for (x, m) in mean.iter_mut().enumerate() {
-        let tap = |k: isize| {
-            let at = (x as isize)
-                .checked_add(offset)?
-                .checked_add(k * stride as isize)?;
-            pixels
-                .get(usize::try_from(at).ok()?)
-                .map(|p| f32::from(p.value()))
-        };
-        let (Some(p0), Some(p1), Some(p2), Some(p3)) = (tap(-1), tap(0), tap(1), tap(2)) else {
-            continue;
-        };
-        mix(m, a * p0 + b * p1 + c * p2 + d * p3);
+    // Where all six taps are inside the line.
+    let (before, after) = (2 * stride as isize, 3 * stride as isize);
+    let from = (before - offset).max(0) as usize;
+    let to = (pixels.len() as isize - after - offset).clamp(0, mean.len() as isize) as usize;
+    let first = from as isize + offset - before;
+    let (Some(mean), Ok(first)) = (mean.get_mut(from..to.max(from)), usize::try_from(first)) else {
+        return;
+    };
+    let Some(line) = pixels.get(first..) else {
+        return;
+    };
+    for (m, taps) in mean.iter_mut().zip(line.windows(5 * stride + 1)) {
+        let value: f32 = taps
+            .iter()
+            .step_by(stride)
+            .zip(weights)
+            .map(|(p, w)| f32::from(p.value()) * w)
+            .sum();
+        mix(m, value);
     }
 }
 
-/// Lagrange's weights of the pixels at −1, 0, 1, 2 for a position `t` in 0..1.
-pub(crate) fn cubic(t: f32) -> [f32; 4] {
+/// Lagrange's weights of the pixels at −2 … 3 for a position `t` in 0..1: between pixels it passes
+/// 99.98 % of what varies with 0.1 cycles/px, 98.5 % at 0.2.
+pub(crate) fn lagrange(t: f32) -> [f32; 6] {
+    let [a, b, c, d, e, f] = [t + 2.0, t + 1.0, t, t - 1.0, t - 2.0, t - 3.0];
     [
-        -t * (t - 1.0) * (t - 2.0) / 6.0,
-        (t + 1.0) * (t - 1.0) * (t - 2.0) / 2.0,
-        -(t + 1.0) * t * (t - 2.0) / 2.0,
-        (t + 1.0) * t * (t - 1.0) / 6.0,
+        -b * c * d * e * f / 120.0,
+        a * c * d * e * f / 24.0,
+        -a * b * d * e * f / 12.0,
+        a * b * c * e * f / 12.0,
+        -a * b * c * d * f / 24.0,
+        a * b * c * d * e / 120.0,
     ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::lagrange;
+
+    #[test]
+    fn polynomials_of_fifth_degree_are_exact() {
+        let p = |x: f32| 1.0 + x * (0.5 + x * (-0.25 + x * (0.125 + x * (0.0625 - 0.03125 * x))));
+        for t in [0.0, 0.1, 0.37, 0.5, 0.99] {
+            let value: f32 = (-2i8..)
+                .zip(lagrange(t))
+                .map(|(x, w)| w * p(f32::from(x)))
+                .sum();
+            assert!((value - p(t)).abs() < 1e-5, "{t}");
+        }
+    }
 }

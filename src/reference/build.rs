@@ -5,7 +5,7 @@
 
 use super::RowTable;
 use crate::{
-    band::{Level, MAX_HALF},
+    band::{DERIVATIVE, HALFWAY, Level, MAX_HALF},
     kernel::{Kernel, MAX_COEFFICIENT},
     noise::PixelNoise,
 };
@@ -36,6 +36,9 @@ const WORST_SD_PX: f32 = 0.4;
 /// Columns on either side over which the energy of the slope is averaged.
 const ENERGY_REACH: usize = 4;
 
+/// Whole shifts either way at which the phase-correlation function is taken.
+const LAGS: usize = DERIVATIVE.len();
+
 /// The buffers of one row, all of its width.
 #[derive(Debug)]
 pub struct Parts<'a> {
@@ -59,6 +62,7 @@ enum Step {
     Orthogonalise,
     Quantise,
     Settle,
+    Correlate(usize),
 }
 
 /// The work on one row, begun and not yet ended.
@@ -83,6 +87,8 @@ pub struct Build {
     /// Σ h²·variance and Σ w·variance.
     noise_power: f32,
     weight_power: f32,
+    /// Σ h(x)·r(x − k) for k = −LAGS ..= LAGS strides.
+    q: [f32; 2 * LAGS + 1],
 }
 
 /// Weighted moments of the reference and of h.
@@ -129,6 +135,7 @@ impl Build {
             excess: 0,
             noise_power: 0.0,
             weight_power: 0.0,
+            q: [0.0; 2 * LAGS + 1],
         }
     }
 
@@ -184,7 +191,24 @@ impl Build {
                 self.quantise(span, parts.mean, w, h, parts.coefficients);
                 Step::Settle
             }
-            Step::Settle => return Some(self.settle(parts.mean, parts.coefficients)),
+            Step::Settle => {
+                if !self.settle(parts.coefficients) {
+                    return Some(self.blank());
+                }
+                self.step = Step::Correlate(0);
+                self.column = 0;
+                return None;
+            }
+            Step::Correlate(lag) => {
+                let Some(q) = self.q.get_mut(lag) else {
+                    return Some(self.expand());
+                };
+                let by = lag as isize - LAGS as isize;
+                *q = correlation(&self.recipe, parts.mean, parts.coefficients, by);
+                self.step = Step::Correlate(lag + 1);
+                self.column = 0;
+                return None;
+            }
         };
         if ended {
             self.step = next;
@@ -260,7 +284,7 @@ impl Build {
 
     /// Where the reference's slope is no larger than its own noise it says nothing and would only let the
     /// line's noise in: a Wiener gain by the energy of nine columns.
-    fn drop_noise(&mut self, span: Range<usize>, mean: &[u16], w: &[f32], h: &mut [f32]) {
+    fn drop_noise(&mut self, span: Range<usize>, mean: &[u16], w: &mut [f32], h: &mut [f32]) {
         let half = self.recipe.level.half_filter();
         let filter_power = 2.0 * half.iter().map(|f| f * f).sum::<f32>() / self.frames;
         let count = (2 * ENERGY_REACH + 1) as f32;
@@ -268,18 +292,21 @@ impl Build {
             let ahead = h.get(x..).unwrap_or(&[]);
             let ahead: f32 = ahead.iter().take(ENERGY_REACH + 1).map(|h| h * h).sum();
             let energy = (ahead + self.before.iter().sum::<f32>()) / count;
-            let (Some(h), Some(&w), Some(&c)) = (h.get_mut(x), w.get(x), mean.get(x)) else {
+            let (Some(h), Some(w), Some(&c)) = (h.get_mut(x), w.get_mut(x), mean.get(x)) else {
                 return;
             };
             self.before.rotate_left(1);
             self.before[ENERGY_REACH - 1] = *h * *h;
             let variance = self.recipe.noise.variance(self.value(c));
-            let noise = w * w * variance * filter_power;
-            *h *= if energy > 2.0 * noise {
+            let noise = *w * *w * variance * filter_power;
+            let gain = if energy > 2.0 * noise {
                 1.0 - noise / energy
             } else {
                 0.0
             };
+            // The weight goes along: it tells how much of the reference's noise is left in h.
+            *h *= gain;
+            *w *= gain;
         }
     }
 
@@ -361,12 +388,16 @@ impl Build {
         }
     }
 
-    /// Makes Σ = 0 exact and fills the table from the row's phase-correlation function q at whole shifts.
-    fn settle(&mut self, mean: &[u16], coefficients: &mut [i8]) -> RowTable {
-        let mut table = RowTable {
+    /// A table without texture.
+    fn blank(&self) -> RowTable {
+        RowTable {
             pixel_sum: self.total as f32 / self.recipe.counts_per_value,
             ..RowTable::default()
-        };
+        }
+    }
+
+    /// Makes Σ h = 0 exact; false when that cannot be, for want of texture.
+    fn settle(&mut self, coefficients: &mut [i8]) -> bool {
         for c in coefficients.iter_mut() {
             if self.excess == 0 {
                 break;
@@ -377,24 +408,26 @@ impl Build {
                 self.excess -= step;
             }
         }
-        if self.excess != 0 || self.noise_power <= 0.0 {
-            coefficients.fill(0);
-            return table;
-        }
-        let mut q = [0.0f32; 7];
-        for (lag, q) in (-3isize..).zip(&mut q) {
-            *q = self.correlation(mean, coefficients, lag) / self.recipe.counts_per_value;
-        }
+        self.excess == 0 && self.noise_power > 0.0
+    }
+
+    /// The table, from the row's phase-correlation function q at whole shifts.
+    fn expand(&mut self) -> RowTable {
+        let mut table = self.blank();
         // The reference's noise stands in h too, where it looks like texture: E Σ h(x)·n(x − k) is
         // ±f[k] times the noise, known, and taken off.
-        for (k, &f) in (1usize..=3).zip(self.recipe.level.half_filter()) {
+        for (k, &f) in (1..).zip(self.recipe.level.half_filter()) {
             let noise = f * self.weight_power / self.frames;
-            q[3 + k] -= noise;
-            q[3 - k] += noise;
+            self.q[LAGS + k] -= noise;
+            self.q[LAGS - k] += noise;
         }
-        let [q_3, q_2, q_1, q0, q1, q2, q3] = q;
+        let q = &self.q;
         let stride = self.recipe.stride as f32;
-        let slope = (45.0 * (q1 - q_1) - 9.0 * (q2 - q_2) + (q3 - q_3)) / (60.0 * stride);
+        let slope: f32 = (1..)
+            .zip(DERIVATIVE)
+            .map(|(k, f)| f * (q[LAGS + k] - q[LAGS - k]))
+            .sum::<f32>()
+            / stride;
         let information = slope * slope / self.noise_power;
         // The reference's own noise makes slopes of about sqrt(Σ h²σ²/frames).
         let chance = libm::sqrtf(self.noise_power / self.frames) * 3.0;
@@ -402,13 +435,15 @@ impl Build {
         if !sure || !information.is_finite() {
             return table;
         }
-        // Half-way between whole shifts by six-point interpolation; the inverse goes through both.
-        let half = |v: [f32; 6]| {
-            let [a, b, c, d, e, f] = v;
-            (3.0 * (a + f) - 25.0 * (b + e) + 150.0 * (c + d)) / 256.0
+        // Half-way between whole shifts; the inverse goes through both.
+        let half = |left: usize| -> f32 {
+            let pairs = (0..).zip(HALFWAY);
+            let value: f32 = pairs
+                .map(|(k, f)| f * (q[left - k] + q[left + 1 + k]))
+                .sum();
+            (value - q[LAGS]) / slope
         };
-        let right = (half([q_2, q_1, q0, q1, q2, q3]) - q0) / slope;
-        let left = (half([q_3, q_2, q_1, q0, q1, q2]) - q0) / slope;
+        let (right, left) = (half(LAGS), half(LAGS - 1));
         // ± stride/2 = u + A·u² + B·u³ at both.
         let (a, b) = if right > 0.0 && left < 0.0 {
             let right_error = (0.5 * stride - right) / (right * right);
@@ -419,27 +454,27 @@ impl Build {
             (0.0, 0.0)
         };
         table.px_per_product = 1.0 / slope;
-        table.offset_px = q0 / slope;
+        table.offset_px = q[LAGS] / slope;
         table.quadratic = rounded(a * 256.0);
         table.cubic = rounded(b * 64.0);
         table.information = (information.to_bits() >> 16) as u16;
         table
     }
+}
 
-    /// Σ h(x)·r(x − lag·stride), in counts.
-    fn correlation(&self, mean: &[u16], coefficients: &[i8], lag: isize) -> f32 {
-        let by = lag.unsigned_abs() * self.recipe.stride;
-        let rest = mean.len().saturating_sub(by);
-        let (mean, coefficients) = if lag >= 0 {
-            (mean.get(..rest), coefficients.get(by..))
-        } else {
-            (mean.get(by..), coefficients.get(..rest))
-        };
-        let (Some(mean), Some(coefficients)) = (mean, coefficients) else {
-            return 0.0;
-        };
-        self.recipe.kernel.sums_u16(mean, coefficients).product as f32
-    }
+/// Σ h(x)·r(x − lag·stride), in pixel values.
+fn correlation(recipe: &Recipe, mean: &[u16], coefficients: &[i8], lag: isize) -> f32 {
+    let by = lag.unsigned_abs() * recipe.stride;
+    let rest = mean.len().saturating_sub(by);
+    let (mean, coefficients) = if lag >= 0 {
+        (mean.get(..rest), coefficients.get(by..))
+    } else {
+        (mean.get(by..), coefficients.get(..rest))
+    };
+    let (Some(mean), Some(coefficients)) = (mean, coefficients) else {
+        return 0.0;
+    };
+    recipe.kernel.sums_u16(mean, coefficients).product as f32 / recipe.counts_per_value
 }
 
 fn rounded(v: f32) -> i8 {
