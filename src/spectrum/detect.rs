@@ -9,6 +9,7 @@ use microfft::Complex32 as Complex;
 use super::fit::Model;
 use super::model::Samples;
 use super::phase::{Frequency, cos_sin};
+use super::storage::MAX_GRID;
 
 /// Candidates of one search.
 pub(crate) const CANDIDATES: usize = 4;
@@ -35,7 +36,7 @@ impl Grid {
     fn over(length_s: f32, highest_hz: f32, most: usize) -> Self {
         let wanted = 1.5 * length_s * highest_hz / 0.36;
         let mut points = 64;
-        while points * 2 <= most.min(32_768) && (points as f32) < wanted {
+        while points * 2 <= most.min(MAX_GRID) && (points as f32) < wanted {
             points *= 2;
         }
         Self {
@@ -197,9 +198,9 @@ fn spread(samples: &mut Samples<'_>, model: &Model, points: &mut [f32], g: Grid)
 fn transform(points: &mut [f32]) -> Option<&mut [Complex]> {
     use microfft::real;
     macro_rules! by_size {
-        ($($size:literal => $fft:ident),*) => {
+        ($($(#[$only:meta])? $size:literal => $fft:ident),*) => {
             match points.len() {
-                $($size => {
+                $($(#[$only])? $size => {
                     let points: &mut [f32; $size] = points.try_into().ok()?;
                     Some(&mut real::$fft(points)[..])
                 })*
@@ -209,7 +210,8 @@ fn transform(points: &mut [f32]) -> Option<&mut [Complex]> {
     }
     by_size!(
         64 => rfft_64, 128 => rfft_128, 256 => rfft_256, 512 => rfft_512, 1024 => rfft_1024,
-        2048 => rfft_2048, 4096 => rfft_4096, 8192 => rfft_8192, 16384 => rfft_16384,
-        32768 => rfft_32768
+        2048 => rfft_2048, 4096 => rfft_4096, 8192 => rfft_8192,
+        #[cfg(feature = "grid-32768")] 16384 => rfft_16384,
+        #[cfg(feature = "grid-32768")] 32768 => rfft_32768
     )
 }

@@ -5,7 +5,7 @@ use super::detect::Band;
 use super::fit::{Fit, Model};
 use super::model::{Samples, TABLE_ROWS};
 use super::search::Search;
-use super::storage::EstimatorStorage;
+use super::storage::{EstimatorStorage, MAX_GRID};
 use super::window::{WindowMark, pack_weight, skew_unit_ns, unpack_weight};
 use crate::report::{MAX_PEAKS, Peak};
 use crate::timeline::Group;
@@ -371,7 +371,7 @@ impl<'a> Estimator<'a> {
         } else {
             0.49 * l.fps
         };
-        let grid = self.storage.grid.len().min(32_768) as f32;
+        let grid = self.storage.grid.len().min(MAX_GRID) as f32;
         let highest_hz = limit.min(0.4 * grid / (1.1 * l.length_s));
         Band {
             lowest_hz: (1.0 / l.length_s).min(0.5 * highest_hz),
