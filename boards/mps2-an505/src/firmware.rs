@@ -1,129 +1,213 @@
 //! Clip in, reports out, figures at the end.
 
-use crate::board::{counter::Counter, host, stack, uart::Uart};
-use crate::lines::{ClipError, Lines, MAX_WIDTH};
-use core::fmt::Write;
-use cortex_m_rt::entry;
-use rowtone::{
-    camera::{Line, Pixels, Timing, TimingError},
-    tracker::{Config, ConfigError, Outcome, Stage, Tracker},
+use crate::board::{
+    counter::{Counter, Start},
+    host, stack,
+    uart::Uart,
 };
+use crate::lines::{ClipError, Lines, MAX_WIDTH};
+use core::fmt::{self, Write};
+use cortex_m_rt::entry;
+use rowtone::analyzer::Analyzer;
+use rowtone::camera::{Timing, TimingError};
+use rowtone::report::Report;
+use rowtone::spectrum;
+use rowtone::timeline::{Binner, BinnerError, Group, Sample};
+use rowtone::tracker::{self, Outcome, Tracker};
+use rowtone::wire::{Message, text};
 use rowtone_mps2_an505::args::Args;
-use rowtone_pico2::memory::TrackerMemory;
-use static_cell::ConstStaticCell;
+use rowtone_mps2_an505::figures::Count;
+use rowtone_pico2::memory::{SpectrumMemory, TrackerMemory, rows_per_sample};
+use static_cell::{ConstStaticCell, StaticCell};
 
-/// What is counted of one kind of work.
-#[derive(Default)]
-struct Count {
-    times: u64,
-    sum: u64,
-    max: u64,
-}
+/// The RP2350 has room for a picture of 320 x 240; a narrower one may have more rows here.
+static LINES: ConstStaticCell<TrackerMemory<{ 320 * 240 }, 480, MAX_WIDTH>> =
+    ConstStaticCell::new(TrackerMemory::new());
+static SPECTRUM: ConstStaticCell<SpectrumMemory> = ConstStaticCell::new(SpectrumMemory::new());
+static ANALYZER: StaticCell<Analyzer<'static>> = StaticCell::new();
 
-impl Count {
-    fn add(&mut self, instructions: u64) {
-        self.times += 1;
-        self.sum += instructions;
-        self.max = self.max.max(instructions);
-    }
-
-    fn mean(&self) -> u64 {
-        self.sum / self.times.max(1)
-    }
-}
+/// Frames that are learned from, at the clip's start; as `rowtone analyze` does it.
+const LEARN_FRAMES: u32 = 30;
 
 #[entry]
 fn start() -> ! {
     let mut uart = Uart::new();
     let mut buffer = [0u8; 1024];
     let result = match host::command_line(&mut buffer).map(Args::parse) {
-        Some(Ok(args)) => run(&args, &mut uart).map_err(|e| write!(uart, "{e}")),
-        Some(Err(e)) => Err(write!(uart, "{e}")),
-        None => Err(uart.write_str("command line: cannot be had")),
+        Some(Ok(args)) => run(&args, &mut uart).map_err(|e| writeln!(uart, "{e}")),
+        Some(Err(e)) => Err(writeln!(uart, "{e}")),
+        None => Err(writeln!(uart, "command line: cannot be had")),
     };
-    if result.is_err() {
-        uart.write(b"\n");
-    }
     host::exit(result.is_ok())
 }
-
-/// The RP2350 has room for a picture of 320 x 240; a narrower one may have more rows here.
-static MEMORY: ConstStaticCell<TrackerMemory<{ 320 * 240 }, 480, MAX_WIDTH>> =
-    ConstStaticCell::new(TrackerMemory::new());
 
 fn run(args: &Args, uart: &mut Uart) -> Result<(), Failure> {
     let counter = cortex_m::Peripherals::take()
         .filter(|_| args.icount)
         .map(|p| Counter::new(p.SYST));
-    let mut lines = Lines::open(args.clip, args.fps_uhz)?;
+    let lines = Lines::open(args.clip, args.fps_uhz)?;
     let clip = *lines.clip();
-    let timing =
-        Timing::new(args.line_time_ps, args.exposure_ns, clip.rows).map_err(Failure::Timing)?;
-    let mut config = Config::new(timing, clip.width);
-    config.learn_frames = u16::MAX;
-    config.columns_per_line = 4;
-    let mut tracker = Tracker::new(config, MEMORY.take().lend()).map_err(Failure::Config)?;
-    let mut pixels = [0u8; MAX_WIDTH];
-    let mut per_line = Count::default();
-    for _ in 0..3 {
-        while let Some((frame, row)) = lines.next(&mut pixels)? {
-            let start_ns = clip.frame_start_ns(frame) + timing.start_ns(row);
-            let line = Line {
-                frame,
-                row,
-                start_ns,
-                pixels: Pixels::U8(&pixels[..usize::from(clip.width)]),
-            };
-            let start = counter.as_ref().map(Counter::start);
-            let outcome = tracker.push(&line);
-            if let (Some(counter), Some(start)) = (&counter, start) {
-                if tracker.stage() == Stage::Tracking {
-                    per_line.add(counter.instructions(start));
-                }
-            }
-            if let Outcome::Measured(d) = outcome
-                && row == 100
-            {
-                let _ = writeln!(uart, "{} {} {}", d.frame, d.time_ns, d.shift_px);
-            }
-        }
-        tracker.end_round();
-        lines.rewind()?;
-    }
-    let _ = writeln!(
+    let timing = Timing::new(args.line_time_ps, args.exposure_ns, clip.rows)?;
+    let window_ns = i64::from(args.window_ms) * 1_000_000;
+    let frames = clip.frames_within(window_ns);
+    let group = Group::new(timing, rows_per_sample(timing, frames))?;
+    let mut tracking = tracker::Config::new(timing, clip.width);
+    // Rounds end when this program says so.
+    tracking.learn_frames = u16::MAX;
+    tracking.columns_per_line = rowtone_pico2::memory::COLUMNS_PER_LINE;
+    let config = spectrum::Config {
+        window_ns,
+        hop_ns: window_ns / 2,
+        ..spectrum::Config::default()
+    };
+    let mut board = Board {
         uart,
-        "insn_per_line={} max_insn_per_line={} stack_max_bytes={} ram_static_bytes={} flash_bytes={}",
-        per_line.mean(),
-        per_line.max,
-        stack::used_max_bytes(),
-        stack::static_ram_bytes(),
-        stack::flash_bytes()
-    );
+        counter,
+        lines,
+        tracker: Tracker::new(tracking, LINES.take().lend())?,
+        binner: Binner::new(group),
+        analyzer: analyzer(config, group)?,
+        timing,
+        per_line: Count::default(),
+        per_spectrum: Count::default(),
+    };
+    board.learn()?;
+    board.measure()?;
+    if args.icount {
+        board.say_figures();
+    }
     Ok(())
+}
+
+/// Not inlined: the analyzer takes 8 KiB, which shall be on the stack only while it is made.
+#[inline(never)]
+fn analyzer(
+    config: spectrum::Config,
+    group: Group,
+) -> Result<&'static mut Analyzer<'static>, spectrum::ConfigError> {
+    Ok(ANALYZER.init(Analyzer::new(config, group, SPECTRUM.take().lend())?))
+}
+
+struct Board<'a> {
+    uart: &'a mut Uart,
+    counter: Option<Counter>,
+    lines: Lines,
+    tracker: Tracker<'static>,
+    binner: Binner,
+    analyzer: &'static mut Analyzer<'static>,
+    timing: Timing,
+    per_line: Count,
+    per_spectrum: Count,
+}
+
+impl Board<'_> {
+    /// Both rounds over the same first frames. A board with a camera has no memory to see frames twice:
+    /// it takes the frames as they come for both.
+    fn learn(&mut self) -> Result<(), Failure> {
+        let mut pixels = [0; MAX_WIDTH];
+        for _ in 0..2 {
+            while let Some(line) = self.lines.next(&mut pixels, &self.timing)? {
+                if line.frame >= LEARN_FRAMES {
+                    break;
+                }
+                self.tracker.push(&line);
+            }
+            self.tracker.end_round();
+            self.lines.rewind()?;
+        }
+        Ok(())
+    }
+
+    fn measure(&mut self) -> Result<(), Failure> {
+        let mut pixels = [0; MAX_WIDTH];
+        while let Some(line) = self.lines.next(&mut pixels, &self.timing)? {
+            let start = self.counter.as_ref().map(Counter::start);
+            let sample = match self.tracker.push(&line) {
+                Outcome::Measured(displacement) => self.binner.push(displacement),
+                _ => None,
+            };
+            if let (Some(counter), Some(start)) = (&self.counter, start) {
+                self.per_line.add(counter.instructions(start));
+            }
+            self.collect(sample);
+        }
+        let last = self.binner.finish();
+        self.collect(last);
+        let start = self.counter.as_ref().map(Counter::start);
+        let report = self.analyzer.finish();
+        self.count_and_say(start, report);
+        Ok(())
+    }
+
+    fn collect(&mut self, sample: Option<Sample>) {
+        if sample.is_some_and(|sample| self.analyzer.push(sample)) {
+            let start = self.counter.as_ref().map(Counter::start);
+            let report = self.analyzer.report();
+            self.count_and_say(start, report);
+        }
+    }
+
+    fn count_and_say(&mut self, start: Option<Start>, report: Option<Report>) {
+        let Some(report) = report else { return };
+        if let (Some(counter), Some(start)) = (&self.counter, start) {
+            self.per_spectrum.add(counter.instructions(start));
+        }
+        if let Err(e) = text::encode(&Message::Report { session: 1, report }, self.uart) {
+            let _ = writeln!(self.uart, "report: {e:?}");
+        }
+    }
+
+    fn say_figures(&mut self) {
+        let _ = writeln!(
+            self.uart,
+            "insn_per_line={} max_insn_per_line={} insn_per_spectrum={} stack_max_bytes={} ram_static_bytes={} \
+             flash_bytes={} min_insn_per_line={} max_insn_per_spectrum={}",
+            self.per_line.mean(),
+            self.per_line.max(),
+            self.per_spectrum.mean(),
+            stack::used_max_bytes(),
+            stack::static_ram_bytes(),
+            stack::flash_bytes(),
+            self.per_line.min(),
+            self.per_spectrum.max(),
+        );
+    }
 }
 
 /// Why a clip was not measured to its end.
 enum Failure {
     Clip(ClipError),
     Timing(TimingError),
-    Config(ConfigError),
+    Group(BinnerError),
+    Tracker(tracker::ConfigError),
+    Spectrum(spectrum::ConfigError),
 }
 
-impl core::fmt::Display for Failure {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Clip(e) => e.fmt(f),
             Self::Timing(e) => e.fmt(f),
-            Self::Config(e) => e.fmt(f),
+            Self::Group(e) => e.fmt(f),
+            Self::Tracker(e) => e.fmt(f),
+            Self::Spectrum(e) => e.fmt(f),
         }
     }
 }
 
-impl From<ClipError> for Failure {
-    fn from(e: ClipError) -> Self {
-        Self::Clip(e)
-    }
+macro_rules! failure_from {
+    ($($kind:ident: $error:ty),*) => {
+        $(impl From<$error> for Failure {
+            fn from(e: $error) -> Self {
+                Self::$kind(e)
+            }
+        })*
+    };
 }
+failure_from!(
+    Clip: ClipError, Timing: TimingError, Group: BinnerError,
+    Tracker: tracker::ConfigError, Spectrum: spectrum::ConfigError
+);
 
 #[panic_handler]
 fn panic(info: &core::panic::PanicInfo) -> ! {

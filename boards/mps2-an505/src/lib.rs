@@ -2,4 +2,5 @@
 #![cfg_attr(not(test), no_std)]
 
 pub mod args;
+pub mod figures;
 pub mod y4m;

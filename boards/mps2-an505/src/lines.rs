@@ -1,6 +1,7 @@
 //! The clip as a camera would deliver it: line after line, each with its time.
 
 use crate::board::host::{File, FileError};
+use rowtone::camera::{Line, Pixels, Timing};
 use rowtone_mps2_an505::y4m::{Clip, MAX_HEADER, Y4mError};
 
 /// Longest line that is read, px: the budget's picture is 320 x 240.
@@ -84,22 +85,18 @@ impl Lines {
         &self.clip
     }
 
-    /// Whole frames in the clip.
-    pub(crate) fn frames(&self) -> u32 {
-        self.frames
-    }
-
     /// Start again at the first line.
     pub(crate) fn rewind(&mut self) -> Result<(), ClipError> {
         (self.frame, self.row) = (0, 0);
         Ok(self.file.seek(self.clip.header_bytes as usize)?)
     }
 
-    /// The next line's frame and row, its pixels in `pixels`; `None` at the end.
-    pub(crate) fn next(
+    /// The next line, its pixels in `pixels`; `None` at the end.
+    pub(crate) fn next<'a>(
         &mut self,
-        pixels: &mut [u8; MAX_WIDTH],
-    ) -> Result<Option<(u32, u16)>, ClipError> {
+        pixels: &'a mut [u8; MAX_WIDTH],
+        timing: &Timing,
+    ) -> Result<Option<Line<'a>>, ClipError> {
         if self.frame >= self.frames {
             return Ok(None);
         }
@@ -110,9 +107,9 @@ impl Lines {
                 return Err(ClipError::Frame(self.frame));
             }
         }
-        let here = (self.frame, self.row);
-        self.file
-            .read_exact(&mut pixels[..usize::from(self.clip.width)])?;
+        let (frame, row) = (self.frame, self.row);
+        let pixels = &mut pixels[..usize::from(self.clip.width)];
+        self.file.read_exact(pixels)?;
         self.row += 1;
         if self.row == self.clip.rows {
             (self.frame, self.row) = (self.frame + 1, 0);
@@ -122,6 +119,12 @@ impl Lines {
                 self.file.seek(next)?;
             }
         }
-        Ok(Some(here))
+        let start_ns = self.clip.frame_start_ns(frame) + timing.start_ns(row);
+        Ok(Some(Line {
+            frame,
+            row,
+            start_ns,
+            pixels: Pixels::U8(pixels),
+        }))
     }
 }

@@ -108,6 +108,13 @@ impl Clip {
         })
     }
 
+    /// Frames that start within a time, rounded up.
+    pub fn frames_within(&self, ns: i64) -> u32 {
+        let ns = u64::try_from(ns).unwrap_or(0);
+        let frames = (ns as f32 * 1e-9) * (self.fps_num as f32 / self.fps_den as f32);
+        frames as u32 + 1
+    }
+
     /// Start of exposure of a frame's first row, ns after that of frame 0, rounded down.
     pub fn frame_start_ns(&self, frame: u32) -> i64 {
         // Whole seconds first: the products stay below 2⁶³ for every 32-bit numerator.
@@ -128,6 +135,7 @@ mod tests {
             (clip.width, clip.rows, clip.chroma_bytes, clip.header_bytes),
             (128, 300, 0, 46)
         );
+        assert_eq!(clip.frames_within(1_500_000_000), 91);
         assert_eq!(clip.frame_start_ns(0), 0);
         assert_eq!(clip.frame_start_ns(1), 16_666_666);
         assert_eq!(clip.frame_start_ns(u32::MAX), 71_582_788_250_000_000);

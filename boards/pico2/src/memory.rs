@@ -1,9 +1,33 @@
-//! The tracker's memory as one static.
+//! The core's memory, as statics of the sizes that fit the RP2350, and what follows from the sizes.
 //!
-//! Everything in it starts as zeros, so it lies in `.bss` and costs no flash.
+//! Everything starts as zeros, so it lies in `.bss` and costs no flash.
 
+use rowtone::camera::Timing;
 use rowtone::reference::RowTable;
-use rowtone::tracker::{RowLearning, Storage};
+use rowtone::spectrum::StaticStorage;
+use rowtone::timeline;
+use rowtone::tracker::{ColumnLearning, RowLearning, Storage};
+
+/// Samples of a window.
+pub const SAMPLES: usize = 4096;
+/// Frames of a window.
+pub const FRAMES: usize = 128;
+/// Samples of a frame.
+pub const SLOTS: usize = 128;
+/// Frequencies up to this one are sampled well, where the memory allows.
+pub const MAX_HZ: f32 = 2000.0;
+/// Columns of a row's coefficients that are built anew beside each line: spreads that work thinly.
+pub const COLUMNS_PER_LINE: u16 = 4;
+
+/// Memory of the spectrum: one window being collected and one being computed, nine tones at once.
+pub type SpectrumMemory = StaticStorage<SAMPLES, FRAMES, SLOTS, 8192, 10>;
+
+/// Rows that make a sample, so that a window of `frames` frames fits [`SpectrumMemory`].
+pub fn rows_per_sample(timing: Timing, frames: u32) -> u16 {
+    let rows = timeline::rows_per_sample(timing, MAX_HZ, frames, SAMPLES);
+    // 128 slots are enough for every u16 of rows only in groups of so many.
+    rows.max(timing.rows().div_ceil(SLOTS as u16))
+}
 
 /// Memory for pictures of up to `PIXELS` pixels, `ROWS` rows and `WIDTH` columns.
 #[derive(Debug)]
@@ -13,7 +37,7 @@ pub struct TrackerMemory<const PIXELS: usize, const ROWS: usize, const WIDTH: us
     tables: heapless::Vec<RowTable, ROWS>,
     learning: heapless::Vec<RowLearning, ROWS>,
     mask: [u8; WIDTH],
-    activity: [u8; WIDTH],
+    columns: heapless::Vec<ColumnLearning, WIDTH>,
     scratch: [[f32; 2]; WIDTH],
 }
 
@@ -28,7 +52,7 @@ impl<const PIXELS: usize, const ROWS: usize, const WIDTH: usize>
             tables: heapless::Vec::new(),
             learning: heapless::Vec::new(),
             mask: [0; WIDTH],
-            activity: [0; WIDTH],
+            columns: heapless::Vec::new(),
             scratch: [[0.0; 2]; WIDTH],
         }
     }
@@ -38,6 +62,7 @@ impl<const PIXELS: usize, const ROWS: usize, const WIDTH: usize>
         // In place: an array of defaults would first stand on the stack. A length of the capacity always fits.
         let _ = self.tables.resize_default(ROWS);
         let _ = self.learning.resize_default(ROWS);
+        let _ = self.columns.resize_default(WIDTH);
         self.mask.fill(u8::MAX);
         Storage {
             coefficients: &mut self.coefficients,
@@ -45,7 +70,7 @@ impl<const PIXELS: usize, const ROWS: usize, const WIDTH: usize>
             mean: &mut self.mean,
             learning: &mut self.learning,
             mask: &mut self.mask,
-            activity: &mut self.activity,
+            columns: &mut self.columns,
             scratch: self.scratch.as_flattened_mut(),
         }
     }
@@ -62,8 +87,23 @@ impl<const PIXELS: usize, const ROWS: usize, const WIDTH: usize> Default
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rowtone::camera::Timing;
     use rowtone::tracker::{Config, Tracker};
+
+    #[test]
+    fn samples_of_a_window_fit() {
+        for (line_time_us, rows, frames) in [
+            (67, 240, 57),
+            (125, 240, 31),
+            (40, 300, 60),
+            (50, 400, 30),
+            (9, 480, 120),
+        ] {
+            let timing = Timing::new(line_time_us * 1_000_000, 0, rows).unwrap();
+            let group = timeline::Group::new(timing, rows_per_sample(timing, frames)).unwrap();
+            assert!(usize::from(group.slots()) <= SLOTS);
+            assert!(usize::from(group.slots()) * frames as usize <= SAMPLES);
+        }
+    }
 
     #[test]
     fn is_enough_for_the_cameras_picture() {
