@@ -38,6 +38,19 @@ pub struct Settings {
     pub um_per_px: Option<f64>,
 }
 
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            window_s: 1.0,
+            hop_s: 0.5,
+            max_peaks: 8,
+            min_hz: None,
+            max_hz: None,
+            um_per_px: None,
+        }
+    }
+}
+
 /// How a recording will be analysed.
 #[derive(Clone, Copy, Debug)]
 pub struct Plan {

@@ -55,7 +55,9 @@ impl<'a> Reporter<'a> {
         let um_per_px = self.estimator.config().um_per_px;
         Report {
             seq: mark.seq,
-            time_ms: (mark.end_ns.saturating_sub(mark.origin_ns).max(0) / 1_000_000) as u64,
+            time_ms: ((mark.end_ns.saturating_sub(mark.origin_ns).max(0) as u64)
+                .saturating_add(500_000))
+                / 1_000_000,
             window_s,
             fps: tones.fps,
             lines: mark.lines,

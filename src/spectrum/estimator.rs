@@ -57,7 +57,6 @@ struct Loaded {
     frames: usize,
     skewed: bool,
     total_weight: f32,
-    information: f32,
     count: u32,
     length_s: f32,
     fps: f32,
@@ -189,7 +188,6 @@ impl<'a> Estimator<'a> {
             // A sample far beyond all others would be all that counts; and one far below, nothing.
             *w = pack_weight(unpack_weight(*w) * scale);
         }
-        self.loaded.information = mean * 1e20;
         self.loaded.count = count;
     }
 
@@ -301,7 +299,8 @@ impl<'a> Estimator<'a> {
         tones.more = outcome.more;
         let freedom = Fit::freedom(&samples, &self.model.tones).max(1.0);
         let scale = self.model.squares / freedom;
-        tones.sample_noise_px = libm::sqrtf(scale / l.information);
+        // Weights have a mean of one, so this is px² already.
+        tones.sample_noise_px = libm::sqrtf(scale);
         tones.row_noise_px =
             tones.sample_noise_px * libm::sqrtf(f32::from(self.group.rows_per_sample()));
         if !tones.sample_noise_px.is_finite() {

@@ -47,7 +47,7 @@ impl Feed {
     pub fn open(args: &CameraArgs) -> Result<Self, Failure> {
         args.check()?;
         if args.input == "-" {
-            return Self::start(args, io::stdin(), None);
+            return Self::read(args, io::stdin(), None);
         }
         let cannot = |what: &str, error: &io::Error| {
             Failure::input(format!("{}: cannot be {what}: {error}", args.input))
@@ -61,15 +61,19 @@ impl Feed {
             )));
         }
         let bytes = meta.is_file().then_some(meta.len());
-        Self::start(args, file, bytes)
+        Self::read(args, file, bytes)
     }
 
-    /// Starts reading `from`, which has `bytes` bytes where that is known.
-    fn start(
+    /// Reads `from`, which has `bytes` bytes where that is known, instead of the input that `args` name.
+    ///
+    /// # Errors
+    /// As [`Feed::open`].
+    pub fn read(
         args: &CameraArgs,
         from: impl Read + Send + 'static,
         bytes: Option<u64>,
     ) -> Result<Self, Failure> {
+        args.check()?;
         let name = args.name().to_owned();
         let reader = Reader::open(from, &name)?;
         let clock = args.clock(reader.header())?;

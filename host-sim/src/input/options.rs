@@ -122,6 +122,23 @@ impl Camera {
 }
 
 impl CameraArgs {
+    /// The options of an input about which nothing else is known.
+    pub fn of(input: &str) -> Self {
+        Self {
+            input: input.to_owned(),
+            fps: None,
+            pts: None,
+            line_time_us: None,
+            calibration: None,
+            exposure_us: 0.0,
+            roi: Roi::Auto,
+            background: None,
+            rotate: Turn::No,
+            global_shutter: false,
+            um_per_px: None,
+        }
+    }
+
     /// What to call the input in messages.
     pub fn name(&self) -> &str {
         if self.input == "-" {

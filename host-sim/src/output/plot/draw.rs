@@ -101,6 +101,7 @@ fn spectrum(area: &Area<'_>, scene: &Scene<'_>) -> Drawn {
             font(16),
         )
         .margin(12)
+        .margin_right(28)
         .x_label_area_size(42)
         .y_label_area_size(70)
         .build_cartesian_2d(band.0..band.1, range.clone().log_scale())?;
@@ -113,6 +114,7 @@ fn spectrum(area: &Area<'_>, scene: &Scene<'_>) -> Drawn {
         .axis_desc_style(font(15))
         .x_desc("frequency, Hz")
         .y_desc("amplitude, px")
+        .x_label_formatter(&|x| format!("{x:.0}"))
         .y_label_formatter(&|y| digits(*y, 1))
         .draw()?;
     let floor = || {
@@ -123,7 +125,7 @@ fn spectrum(area: &Area<'_>, scene: &Scene<'_>) -> Drawn {
     };
     chart.draw_series(AreaSeries::new(floor(), range.start, FLOOR.mix(0.25)))?;
     chart.draw_series(LineSeries::new(floor(), FLOOR))?;
-    let mut labelled: Vec<i32> = Vec::new();
+    let mut labelled: Vec<(i32, i32)> = Vec::new();
     for peak in &scene.report.peaks {
         let (hz, px) = (f64::from(peak.hz), f64::from(peak.amplitude_px));
         chart.draw_series([PathElement::new(
@@ -132,8 +134,10 @@ fn spectrum(area: &Area<'_>, scene: &Scene<'_>) -> Drawn {
         )])?;
         chart.draw_series([Circle::new((hz, px), 4, TONE.filled())])?;
         // The largest come first: a label that would cover an earlier one is left out.
-        let at = chart.backend_coord(&(hz, px)).0;
-        if labelled.iter().all(|other| (other - at).abs() > 90) {
+        let at = chart.backend_coord(&(hz, px));
+        let apart =
+            |other: &(i32, i32)| (other.0 - at.0).abs() > 150 || (other.1 - at.1).abs() > 16;
+        if labelled.iter().all(apart) {
             labelled.push(at);
             let label = format!("{:.2} Hz, {} px", peak.hz, digits(px, 3));
             let place = EmptyElement::at((hz, px)) + Text::new(label, (8, -8), font(14));
@@ -159,6 +163,7 @@ fn displacement(area: &Area<'_>, scene: &Scene<'_>) -> Drawn {
     let mut chart = ChartBuilder::on(area)
         .caption("Displacement, a few frames", font(16))
         .margin(12)
+        .margin_right(28)
         .x_label_area_size(42)
         .y_label_area_size(70)
         .build_cartesian_2d(0.0..end * 1e3, -tall..tall)?;
@@ -222,10 +227,11 @@ fn spectrogram(area: &Area<'_>, scene: &Scene<'_>) -> Drawn {
     let mut chart = ChartBuilder::on(area)
         .caption("Amplitude over time and frequency", font(16))
         .margin(12)
+        .margin_right(28)
         .x_label_area_size(42)
         .y_label_area_size(70)
         .build_cartesian_2d(start..end, band.0..band.1)?;
-    mesh(&mut chart, "time, s", "frequency, Hz", 1e3)?;
+    mesh(&mut chart, "time, s", "frequency, Hz", band.1)?;
     let width = (end - start) / columns.len().max(1) as f64;
     for (i, column) in columns.iter().enumerate() {
         let shade = |px: f32| {
