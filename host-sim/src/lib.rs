@@ -1,15 +1,17 @@
 //! The host's side of rowtone: a simulated camera at a simulated machine, video files, and the
 //! command `rowtone`.
 //!
-//! The core (package `rowtone`) knows no file, no serial port and no clock; all of that is here:
+//! The core (package `rowtone`) knows no file, no serial port and no clock; all of that is here. A
+//! recording goes through it in this order:
 //!
-//! - [`commands`]: one file a command, each with its options and what it does;
-//! - [`failure`]: what every command says, and exits with, when it cannot go on;
+//! - [`sim`]: a simulated rolling-shutter camera, with the truth about what it saw;
 //! - [`input`]: videos and the camera options;
-//! - [`output`]: reports, displacements and pictures;
-//! - [`serial`]: serial ports;
-//! - [`tracking`]: frames to displacements.
-//! - [`sim`]: a simulated rolling-shutter camera, with the truth about what it saw.
+//! - [`tracking`]: frames to displacements;
+//! - [`analysis`]: displacements to reports, in the memory that [`memory`] lends;
+//! - [`output`]: reports, displacements and pictures; [`serial`]: serial ports;
+//! - [`calibrate`]: what a flashing light tells about a camera; [`linear`]: small linear algebra;
+//! - [`commands`]: one file a command, each with its options and what it does;
+//! - [`failure`]: what every command says, and exits with, when it cannot go on.
 
 pub mod analysis;
 pub mod calibrate;
