@@ -1,0 +1,165 @@
+//! Bad input: one clear line, the right exit status, and nothing lost that was measured before.
+
+mod common;
+
+use std::io::Write;
+use std::process::Stdio;
+
+use common::{CAMERA, assert_failure, command, config, file, on_clip, reports, texts, y4m};
+
+#[test]
+fn files_that_are_no_clip() {
+    let missing = std::path::Path::new("no/such/clip.y4m");
+    assert_failure(
+        &on_clip("analyze", missing, &[]),
+        1,
+        &["clip.y4m", "opened"],
+    );
+    let empty = file("empty.y4m", b"");
+    assert_failure(&on_clip("analyze", &empty, &[]), 1, &["empty"]);
+    let wave = file("wave.y4m", b"RIFF....WAVEfmt ");
+    assert_failure(&on_clip("displacement", &wave, &[]), 1, &["not a Y4M"]);
+    let no_frame = file("no-frame.y4m", b"YUV4MPEG2 W96 H120 F60:1 Cmono\n");
+    assert_failure(&on_clip("analyze", &no_frame, &[]), 1, &["no frame"]);
+    let folder = file("in-a-folder", b"");
+    assert_failure(
+        &on_clip("analyze", folder.parent().unwrap(), &[]),
+        1,
+        &["folder"],
+    );
+    let one = file("one.y4m", &y4m(config(1)));
+    assert_failure(&on_clip("analyze", &one, &[]), 1, &["only one frame"]);
+}
+
+#[test]
+fn a_truncated_last_frame_costs_only_itself() {
+    let mut bytes = y4m(config(60));
+    bytes.truncate(bytes.len() - 1000);
+    let clip = file("truncated.y4m", &bytes);
+    let output = on_clip("displacement", &clip, &["--rows-per-sample", "120"]);
+    assert_failure(&output, 0, &["cut off", "59 before it"]);
+    assert_eq!(texts(&output).0.lines().count(), 1 + 59);
+    let output = on_clip("analyze", &clip, &["--format", "json"]);
+    assert_failure(&output, 0, &["cut off"]);
+    common::assert_the_tone(&reports(&texts(&output).0)[0]);
+}
+
+#[test]
+fn a_header_that_lies() {
+    let honest = y4m(config(20));
+    let lie = |name: &str, header: &str| {
+        let body = honest.iter().position(|&b| b == b'\n').unwrap();
+        let bytes = [header.as_bytes(), &honest[body..]].concat();
+        on_clip("analyze", &file(name, &bytes), &[])
+    };
+    let wider = lie("wider.y4m", "YUV4MPEG2 W100 H120 F60:1 Cmono");
+    assert_failure(&wider, 1, &["100x120"]);
+    let colour = lie("colour.y4m", "YUV4MPEG2 W96 H120 F60:1 C420");
+    assert_failure(&colour, 1, &["FRAME"]);
+    let huge = lie("huge.y4m", "YUV4MPEG2 W60000 H120 F60:1 Cmono");
+    assert_failure(&huge, 1, &["not even one frame"]);
+    let no_rate = lie("no-rate.y4m", "YUV4MPEG2 W96 H120 F0:0 Cmono");
+    assert_failure(&no_rate, 1, &["--fps"]);
+    let interlaced = lie("interlaced.y4m", "YUV4MPEG2 W96 H120 F60:1 It Cmono");
+    assert_failure(&interlaced, 1, &["interlaced"]);
+}
+
+#[test]
+fn a_picture_narrower_than_the_band() {
+    let frame = [b"FRAME\n".as_slice(), &[90; 8 * 10]].concat();
+    let bytes = [
+        b"YUV4MPEG2 W8 H10 F60:1 Cmono\n".as_slice(),
+        &frame.repeat(5),
+    ]
+    .concat();
+    let clip = file("narrow.y4m", &bytes);
+    assert_failure(&on_clip("analyze", &clip, &[]), 1, &["8 px"]);
+}
+
+#[test]
+fn frame_times_that_cannot_be() {
+    let clip = file("timed.y4m", &y4m(config(10)));
+    let times = |name: &str, text: &str| {
+        let path = file(name, text.as_bytes());
+        on_clip("analyze", &clip, &["--pts", path.to_str().unwrap()])
+    };
+    let few = times("few.pts", "# timecode format v2\n0\n16.7\n33.3\n");
+    assert_failure(&few, 1, &["few.pts", "only 3 times", "10 frames"]);
+    let unordered = times("unordered.pts", "# timecode format v2\n0\n16.7\n16.6\n");
+    assert_failure(&unordered, 1, &["unordered.pts", "line 4"]);
+    let words = times("words.pts", "# timecode format v2\n0\nsoon\n");
+    assert_failure(&words, 1, &["words.pts", "line 3", "soon"]);
+    assert_failure(
+        &times("none.pts", "# timecode format v2\n"),
+        1,
+        &["no time"],
+    );
+    let missing = on_clip("analyze", &clip, &["--pts", "no/such.pts"]);
+    assert_failure(&missing, 1, &["no/such.pts"]);
+}
+
+#[test]
+fn what_was_measured_before_the_times_end_comes_out() {
+    let times: String = (0..60)
+        .map(|i| format!("{}\n", f64::from(i) * 1000.0 / 60.0))
+        .collect();
+    let pts = file("ends.pts", times.as_bytes());
+    let args = [
+        "analyze",
+        "-",
+        "--format",
+        "json",
+        "--pts",
+        pts.to_str().unwrap(),
+    ];
+    let mut child = command(args.iter().chain(&CAMERA))
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    // The command stops reading at the frame without a time.
+    let _ = child.stdin.take().unwrap().write_all(&y4m(config(80)));
+    let output = child.wait_with_output().unwrap();
+    assert_failure(&output, 1, &["only 60 times", "at least 61"]);
+    common::assert_the_tone(&reports(&texts(&output).0)[0]);
+}
+
+#[test]
+fn command_lines_that_are_wrong() {
+    let clip = file("options.y4m", &y4m(config(5)));
+    let path = clip.to_str().unwrap();
+    let bare = command(["analyze", path]).output().unwrap();
+    assert_failure(
+        &bare,
+        2,
+        &["--line-time-us", "--calibration", "--global-shutter"],
+    );
+    for (options, word) in [
+        (&["--roi", "90,0,10,10"] as &[_], "not inside"),
+        (&["--roi", "1,2,3"], "X,Y,W,H"),
+        (&["--background", "0,119,96,2"], "not inside"),
+        (&["--background", "0,0,96,120"], "whole picture"),
+        (&["--rotate", "45"], "90"),
+        (&["--fps", "-60"], "--fps"),
+        (&["--fps", "500"], "longer than a frame"),
+        (&["--max-peaks", "17"], "--max-peaks"),
+        (&["--min-hz", "50", "--max-hz", "20"], "--min-hz"),
+        (&["--plot", "picture.gif"], ".svg or .png"),
+        (&["--format", "xml"], "xml"),
+        (&["--no-such-option"], "--no-such-option"),
+        (&["--global-shutter"], "--line-time-us"),
+    ] {
+        assert_failure(&on_clip("analyze", &clip, options), 2, &[word]);
+    }
+}
+
+#[test]
+fn help_and_version_are_results() {
+    for args in [&["--help"] as &[_], &["analyze", "--help"], &["--version"]] {
+        let output = command(args).output().unwrap();
+        let (stdout, stderr) = texts(&output);
+        assert!(output.status.success() && stderr.is_empty());
+        assert!(stdout.contains("rowtone"), "{stdout}");
+    }
+}
