@@ -43,13 +43,14 @@ pub(crate) fn average_in<P: Pixel>(
     let Some(line) = pixels.get(first..) else {
         return;
     };
-    for (m, taps) in mean.iter_mut().zip(line.windows(5 * stride + 1)) {
-        let value: f32 = taps
-            .iter()
-            .step_by(stride)
-            .zip(weights)
-            .map(|(p, w)| f32::from(p.value()) * w)
-            .sum();
+    let tap = |k: usize| line.get(k * stride..).unwrap_or(&[]).iter();
+    let [a, b, c, d, e, f] = weights;
+    let pairs = [tap(0).zip(tap(1)), tap(2).zip(tap(3)), tap(4).zip(tap(5))];
+    let [first, second, third] = pairs;
+    for (m, ((ab, cd), ef)) in mean.iter_mut().zip(first.zip(second).zip(third)) {
+        let v = |p: &P| f32::from(p.value());
+        let value =
+            a * v(ab.0) + b * v(ab.1) + c * v(cd.0) + d * v(cd.1) + e * v(ef.0) + f * v(ef.1);
         mix(m, value);
     }
 }

@@ -33,8 +33,11 @@ pub struct Recipe {
 /// Rows whose shift is less sure than this are not used, px.
 const WORST_SD_PX: f32 = 0.4;
 
-/// Columns on either side over which the energy of the slope is averaged.
+/// Columns on either side over which the energy of the slope is averaged, and their number.
 const ENERGY_REACH: usize = 4;
+const ENERGY_COLUMNS: usize = 2 * ENERGY_REACH + 1;
+/// Ring of the last squares: a power of two, so that a position is a mask away.
+const RING: usize = ENERGY_COLUMNS.next_power_of_two();
 
 /// Whole shifts either way at which the phase-correlation function is taken.
 const LAGS: usize = DERIVATIVE.len();
@@ -44,7 +47,8 @@ const LAGS: usize = DERIVATIVE.len();
 pub struct Parts<'a> {
     /// The reference row, in counts.
     pub mean: &'a [u16],
-    /// Weight of each column, 0 = unused.
+    /// Weight of each column, 0 = unused; the band's filter reaches [`MAX_HALF`] strides into what lies
+    /// beside.
     pub mask: &'a [u8],
     /// Scratch, kept from one call of [`Build::advance`] to the next: weights, then h.
     pub scratch: &'a mut [f32],
@@ -75,8 +79,9 @@ pub struct Build {
     column: usize,
     /// Σ r, in counts.
     total: u64,
-    /// Squares of the last columns of h as they were, oldest first.
-    before: [f32; ENERGY_REACH],
+    /// Squares of the last columns of h as they were, in a ring, and the sum around the present one.
+    before: [f32; RING],
+    energy: f32,
     sums: Moments,
     /// h ← h − w·(α + β·r).
     alpha_beta: (f32, f32),
@@ -127,7 +132,8 @@ impl Build {
             step: Step::Weigh,
             column: 0,
             total: 0,
-            before: [0.0; ENERGY_REACH],
+            before: [0.0; RING],
+            energy: 0.0,
             sums: Moments::default(),
             alpha_beta: (0.0, 0.0),
             largest: 0.0,
@@ -226,8 +232,8 @@ impl Build {
         self.total as f32 / width.max(1) as f32 / self.recipe.counts_per_value
     }
 
-    /// w: a column's mask times the inverse variance of its pixel; 0 beyond the margin, beside a masked
-    /// column, and where the pixel is saturated.
+    /// w: a column's mask times the inverse variance of its pixel; 0 beyond the margin and where the pixel
+    /// is saturated.
     fn weigh(&mut self, span: Range<usize>, mean: &[u16], mask: &[u8], w: &mut [f32]) {
         let r = self.recipe;
         let reach = r.level.half_filter().len() * r.stride;
@@ -243,8 +249,7 @@ impl Build {
             if value >= r.saturation || from_edge < reach {
                 continue;
             }
-            let near = mask.get(x - reach..=x + reach).unwrap_or(&[]);
-            let mask = near.iter().copied().min().unwrap_or(0);
+            let mask = mask.get(x).copied().unwrap_or(0);
             // A soft edge over four pixels, so that a picture moving past it changes little at a time.
             let ramp = match r.margin_px {
                 0 => 1.0,
@@ -287,18 +292,26 @@ impl Build {
     fn drop_noise(&mut self, span: Range<usize>, mean: &[u16], w: &mut [f32], h: &mut [f32]) {
         let half = self.recipe.level.half_filter();
         let filter_power = 2.0 * half.iter().map(|f| f * f).sum::<f32>() / self.frames;
-        let count = (2 * ENERGY_REACH + 1) as f32;
+        let threshold = filter_power * ENERGY_COLUMNS as f32;
+        if span.start == 0 {
+            self.energy = h.iter().take(ENERGY_REACH).map(|h| h * h).sum();
+        }
         for x in span {
-            let ahead = h.get(x..).unwrap_or(&[]);
-            let ahead: f32 = ahead.iter().take(ENERGY_REACH + 1).map(|h| h * h).sum();
-            let energy = (ahead + self.before.iter().sum::<f32>()) / count;
+            let ahead = h.get(x + ENERGY_REACH).map_or(0.0, |h| h * h);
             let (Some(h), Some(w), Some(&c)) = (h.get_mut(x), w.get_mut(x), mean.get(x)) else {
                 return;
             };
-            self.before.rotate_left(1);
-            self.before[ENERGY_REACH - 1] = *h * *h;
-            let variance = self.recipe.noise.variance(self.value(c));
-            let noise = *w * *w * variance * filter_power;
+            // A running sum over the columns x ± ENERGY_REACH, as they were before this step. What
+            // rounding leaves behind is far below the noise.
+            self.energy += ahead;
+            let energy = self.energy;
+            let own = &mut self.before[x % RING];
+            *own = *h * *h;
+            let behind = (x + RING - ENERGY_REACH) % RING;
+            if x >= ENERGY_REACH {
+                self.energy = (self.energy - self.before[behind]).max(0.0);
+            }
+            let noise = *w * *w * self.recipe.noise.variance(self.value(c)) * threshold;
             let gain = if energy > 2.0 * noise {
                 1.0 - noise / energy
             } else {
@@ -371,19 +384,21 @@ impl Build {
         ) else {
             return;
         };
-        for (((c, &h), &w), &count) in coefficients.iter_mut().zip(h).zip(w).zip(mean) {
+        for (c, &h) in coefficients.iter_mut().zip(h) {
             *c = 0;
-            if h == 0.0 {
-                continue;
+            if h != 0.0 {
+                let wanted = h * scale + self.carry;
+                // Half away from zero, without a call: the value is within ±64.
+                let whole = (wanted + 0.5f32.copysign(wanted)).clamp(-limit, limit) as i32;
+                self.carry = (wanted - whole as f32).clamp(-1.0, 1.0);
+                *c = whole as i8;
+                self.excess += whole;
             }
-            let wanted = h * scale + self.carry;
-            // Half away from zero, without a call: the value is within ±64.
-            let whole = (wanted + 0.5f32.copysign(wanted)).clamp(-limit, limit) as i8;
-            self.carry = (wanted - f32::from(whole)).clamp(-1.0, 1.0);
-            *c = whole;
-            self.excess += i32::from(whole);
+        }
+        for ((&c, &w), &count) in coefficients.iter().zip(w).zip(mean) {
+            let c = f32::from(c);
             let variance = self.recipe.noise.variance(self.value(count));
-            self.noise_power += f32::from(whole) * f32::from(whole) * variance;
+            self.noise_power += c * c * variance;
             self.weight_power += w * variance * scale;
         }
     }

@@ -7,7 +7,12 @@ use super::{
     watch::Watch,
 };
 use crate::{
-    align, band::Level, noise::NoiseMeter, noise::PixelNoise, pixel::Pixel, reference::RowTable,
+    align,
+    band::{Level, MAX_HALF},
+    noise::NoiseMeter,
+    noise::PixelNoise,
+    pixel::Pixel,
+    reference::RowTable,
 };
 
 /// What learning keeps of a row.
@@ -42,6 +47,9 @@ const MEMORY_FRAMES: u16 = 64;
 
 /// Rows on which the levels of the band are tried.
 const TRIAL_ROWS: usize = 24;
+
+/// One row in so many measures the pixels' noise, in turns.
+const NOISE_ROWS: usize = 4;
 
 /// Motion below this stays within the rows' polynomials, px.
 const SMALL_MOTION_PX: f32 = 0.6;
@@ -134,7 +142,7 @@ impl Tracker<'_> {
             self.note_activity(pixels);
         }
         // A row that reads black or white throughout would tell of too little noise.
-        if textured {
+        if textured && row % NOISE_ROWS == self.frames_in_stage as usize % NOISE_ROWS {
             self.measure_noise(row, pixels, shift_px - centre, seen.frames);
         }
         self.average(row, pixels, shift_px - centre, u16::MAX);
@@ -252,6 +260,7 @@ impl Tracker<'_> {
     /// Masks columns that never changed while their neighbours did: up to three side by side. (A longer
     /// run is a part of the picture without noise, a clipped one say, and knows nothing anyway.)
     fn mask_dead_columns(&mut self) {
+        let reach = MAX_HALF * usize::from(self.config.stride);
         let columns = &self.storage.columns;
         let dead = |x: usize| {
             columns
@@ -266,9 +275,10 @@ impl Tracker<'_> {
             }
             let alone = x > 0 && x + run < columns.len();
             if alone && (1..=3).contains(&run) {
-                for mask in self.storage.mask.iter_mut().skip(x).take(run) {
-                    *mask = 0;
-                }
+                // The band's filter must not reach a dead column either.
+                let from = x.saturating_sub(reach);
+                let mask = self.storage.mask.iter_mut().skip(from);
+                mask.take(x - from + run + reach).for_each(|m| *m = 0);
             }
             x += run + 1;
         }

@@ -10,7 +10,10 @@ use super::{Stage, Tracker, overlap::Overlap};
 use crate::{pixel::Pixel, reference::RowTable};
 
 /// In tracking one row in this many is looked at even if it does not surprise.
-const EVERY: usize = 16;
+const EVERY: usize = 32;
+
+/// Columns that are looked at, about.
+const COLUMNS: usize = 48;
 
 /// A scene that does not fit for so long is a new scene, ns.
 const NEW_SCENE_NS: i64 = 1_500_000_000;
@@ -121,7 +124,7 @@ impl Tracker<'_> {
         fits
     }
 
-    /// What is left of a line when its reference, shifted, is taken off; every fourth column serves.
+    /// What is left of a line when its reference, shifted, is taken off; some columns serve.
     fn rest<P: Pixel>(&self, row: usize, pixels: &[P], shift_px: f32) -> Option<Rest> {
         let width = pixels.len();
         let r = &self.recipe;
@@ -147,7 +150,7 @@ impl Tracker<'_> {
             .zip(line.get(r.margin_px + r.stride..)?)
             .zip(mask.get(r.margin_px + r.stride..)?)
             .take(inner)
-            .step_by(4)
+            .step_by((width / COLUMNS).max(1))
         {
             let (Some(&left), Some(&here), Some(&right)) =
                 (window.first(), window.get(r.stride), window.last())

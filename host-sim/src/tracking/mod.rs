@@ -21,6 +21,8 @@ use crate::input::{Camera, Feed, Frame, Rect};
 
 /// Frames that the reference is learned from.
 const LEARN_FRAMES: usize = 30;
+/// Frames of the first round.
+const ROUGH_FRAMES: usize = 10;
 /// Fewer where they are so large that keeping them would take more than this, bytes of luma.
 const LEARN_BYTES: usize = 512 << 20;
 /// Frames of displacements on their way: the lines go on while a report is computed.
@@ -186,12 +188,16 @@ impl<'a> Lines<'a> {
                 self.feed.name
             )));
         }
-        for _ in 0..2 {
+        // The first round only has to find the motion: some frames, spread over all of them, will do.
+        let rough = kept.len().div_ceil(ROUGH_FRAMES);
+        for step in [rough, 1] {
             for engine in [Some(&mut self.moving), self.still.as_mut()]
                 .into_iter()
                 .flatten()
             {
-                kept.iter().for_each(|frame| engine.learn(frame));
+                kept.iter()
+                    .step_by(step)
+                    .for_each(|frame| engine.learn(frame));
                 engine.end_round();
             }
         }
