@@ -14,15 +14,10 @@ pub(super) struct Follow {
     anchor_px: i32,
 }
 
-/// A row takes a little of the picture once in so many frames, a multiple of what the watch looks at.
-const EVERY: usize = 128;
+/// One row in so many frames takes a little of the picture: building its coefficients anew is what costs.
+const FRAMES_A_ROW: u32 = 4;
 
 impl Follow {
-    /// Rows take turns.
-    pub(super) fn is_turn_of(&self, row: usize, frame: Option<u32>) -> bool {
-        self.work.is_none() && row % EVERY == frame.unwrap_or(0) as usize % EVERY
-    }
-
     #[inline]
     pub(super) fn anchor_px(&self) -> f32 {
         self.anchor_px as f32
@@ -37,6 +32,16 @@ const DRIFT_FRAMES: f32 = 128.0;
 const CREEP_PX: f32 = 1.5;
 
 impl Tracker<'_> {
+    /// The row whose turn it is in this frame; rows far apart follow each other.
+    pub(super) fn turn_of(&self, frame: u32) -> usize {
+        let free = self.stage == Stage::Tracking && self.follow.work.is_none();
+        if !free || !frame.is_multiple_of(FRAMES_A_ROW) {
+            return usize::MAX;
+        }
+        // 619 is prime: every row has its turn.
+        (frame / FRAMES_A_ROW).wrapping_mul(619) as usize % usize::from(self.config.rows)
+    }
+
     /// Goes on with the row whose coefficients are being built anew, some columns a line; a row that is
     /// about to be measured is finished first.
     #[inline]

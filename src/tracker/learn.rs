@@ -42,8 +42,8 @@ impl RowLearning {
 /// A row that knows its shift no better than this is aligned like its neighbours, 1/px².
 const OWN_INFORMATION_PER_PX2: f32 = 25.0;
 
-/// While tracking, the reference forgets over so many frames of a row.
-const MEMORY_FRAMES: u16 = 64;
+/// While tracking, the reference forgets over so many turns of a row.
+const MEMORY_FRAMES: u16 = 32;
 
 /// Rows on which the levels of the band are tried.
 const TRIAL_ROWS: usize = 24;

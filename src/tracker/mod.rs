@@ -77,6 +77,8 @@ pub struct Tracker<'a> {
     range_px: f32,
     watch: Watch,
     follow: Follow,
+    /// The row of this frame from which the reference is followed; none while learning.
+    turn: usize,
     counts: Counts,
 }
 
@@ -127,6 +129,7 @@ impl<'a> Tracker<'a> {
             range_px: 0.0,
             watch: Watch::default(),
             follow: Follow::default(),
+            turn: usize::MAX,
             counts: Counts::default(),
         };
         tracker.relearn();
@@ -214,7 +217,8 @@ impl<'a> Tracker<'a> {
         }
         self.frames_in_stage = self.frames_in_stage.saturating_add(1);
         self.frame = Some(frame);
-        self.watch.begin_frame();
+        self.turn = self.turn_of(frame);
+        self.watch.begin_frame(frame);
     }
 
     /// Shift of a line against its reference, in the reference's own coordinates.
@@ -233,7 +237,9 @@ impl<'a> Tracker<'a> {
             return Found::NoTexture;
         };
         let surprise = shift_px - expected;
-        let due = self.watch.is_due(row, self.frame)
+        let turn = self.turn == row;
+        let due = turn
+            || self.watch.is_due(row)
             || surprise * surprise * information_per_px2 > 49.0 + information_per_px2
             || (self.gain - before).abs() > 0.05 * before.abs();
         if due {
@@ -241,7 +247,7 @@ impl<'a> Tracker<'a> {
                 Some(looked) => shift_px = looked,
                 None => return Found::Disturbed,
             }
-            if self.follow.is_turn_of(row, self.frame) && self.stage == Stage::Tracking {
+            if turn {
                 self.follow_row(row, pixels, shift_px);
             }
         }

@@ -21,10 +21,10 @@ const NEW_SCENE_NS: i64 = 1_500_000_000;
 /// What the watch remembers.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Watch {
-    /// The last line looked at did not fit: look at every line.
-    disturbed: bool,
-    /// The frame has begun and no line was looked at yet.
-    new_frame: bool,
+    /// The last line looked at did not fit, or the frame has just begun: look at every line.
+    every_line: bool,
+    /// Remainder of the rows that are looked at in this frame.
+    turn: usize,
     /// Lines to wait before the next search, while nothing fits.
     rest: u8,
     /// Lines of this frame that fitted, and that did not.
@@ -39,13 +39,13 @@ pub(super) struct Watch {
 
 impl Watch {
     #[inline]
-    pub(super) fn is_due(&self, row: usize, frame: Option<u32>) -> bool {
-        let turn = frame.unwrap_or(0) as usize % EVERY;
-        self.disturbed || self.new_frame || row % EVERY == turn
+    pub(super) fn is_due(&self, row: usize) -> bool {
+        self.every_line || row % EVERY == self.turn
     }
 
-    pub(super) fn begin_frame(&mut self) {
-        self.new_frame = true;
+    pub(super) fn begin_frame(&mut self, frame: u32) {
+        self.turn = frame as usize % EVERY;
+        self.every_line = true;
         self.rest = 0;
         self.fitted = 0;
         self.unfit = 0;
@@ -86,7 +86,6 @@ impl Tracker<'_> {
         pixels: &[P],
         shift_px: f32,
     ) -> Option<f32> {
-        self.watch.new_frame = false;
         let mut fit = self.fits(row, pixels, shift_px).then_some(shift_px);
         if fit.is_none() && self.watch.rest == 0 {
             self.watch.rest = 8;
@@ -96,7 +95,7 @@ impl Tracker<'_> {
                 .filter(|&shift| self.fits(row, pixels, shift));
         }
         self.watch.rest = self.watch.rest.saturating_sub(1);
-        self.watch.disturbed = fit.is_none();
+        self.watch.every_line = fit.is_none();
         if fit.is_some() {
             self.watch.fitted += 1;
         } else {
