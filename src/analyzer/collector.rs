@@ -140,6 +140,11 @@ impl<'a> Collector<'a> {
         true
     }
 
+    /// Gives its memory back, for a collector with another config.
+    pub fn into_storage(self) -> SampleBuffer<'a> {
+        self.ring
+    }
+
     /// Samples dropped so far.
     pub const fn dropped_samples(&self) -> u32 {
         self.dropped_samples

@@ -30,6 +30,17 @@ impl<'a> Reporter<'a> {
         })
     }
 
+    /// Begins anew with another config, in the same memory and in place.
+    ///
+    /// # Errors
+    /// As [`Reporter::new`]; then nothing has changed.
+    pub fn restart(&mut self, config: Config, group: Group) -> Result<(), ConfigError> {
+        self.estimator.restart(config, group)?;
+        self.follower = Follower::new();
+        self.last_end_ns = None;
+        Ok(())
+    }
+
     pub(crate) fn load(
         &mut self,
         mark: WindowMark,

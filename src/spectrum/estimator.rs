@@ -81,19 +81,42 @@ impl<'a> Estimator<'a> {
             mark: WindowMark::default(),
             loaded: Loaded::default(),
         };
-        let slots = usize::from(group.slots());
+        estimator.check_storage()?;
+        Ok(estimator)
+    }
+
+    /// Begins anew with another config, in the same memory and in place.
+    ///
+    /// # Errors
+    /// As [`Estimator::new`]; then nothing has changed.
+    pub fn restart(&mut self, config: Config, group: Group) -> Result<(), ConfigError> {
+        config.check()?;
+        let before = core::mem::replace(&mut self.group, group);
+        if let Err(error) = self.check_storage() {
+            self.group = before;
+            return Err(error);
+        }
+        self.config = config;
+        self.model = Model::new();
+        self.mark = WindowMark::default();
+        self.loaded = Loaded::default();
+        Ok(())
+    }
+
+    fn check_storage(&self) -> Result<(), ConfigError> {
+        let slots = usize::from(self.group.slots());
         let needs = [
-            ("frames", 2, estimator.frame_capacity()),
-            ("slots", slots, estimator.slot_capacity()),
-            ("tones", 1, estimator.tone_capacity()),
-            ("grid", 64, estimator.storage.grid.len()),
+            ("frames", 2, self.frame_capacity()),
+            ("slots", slots, self.slot_capacity()),
+            ("tones", 1, self.tone_capacity()),
+            ("grid", 64, self.storage.grid.len()),
         ];
         for (part, needs, holds) in needs {
             if holds < needs {
                 return Err(ConfigError::Storage { part, needs, holds });
             }
         }
-        Ok(estimator)
+        Ok(())
     }
 
     /// Frames a window may have.
