@@ -11,6 +11,12 @@ pub const MEMORY: u32 = 256;
 /// Frames after which the period is known well enough to measure by (some parts in a million).
 pub const SETTLED: u32 = 64;
 
+/// Once settled, a VSYNC that is read so much later or earlier than expected tells nothing of the time, ns:
+/// the interrupt had to wait (for the flash, say). It still counts its frame.
+pub const MOST_LATE_NS: i64 = 100_000;
+/// After so many of them in a row it is the camera that changed, and the rhythm is learned anew.
+pub const MOST_LATE: u32 = 16;
+
 /// A frame began.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FrameStart {
@@ -34,6 +40,7 @@ pub struct FrameClock {
     /// Frames in the filter's memory, at most [`MEMORY`].
     seen: u32,
     glitches: u32,
+    late_in_a_row: u32,
 }
 
 const SCALE: i64 = 256;
@@ -49,6 +56,7 @@ impl FrameClock {
             frame: 0,
             seen: 0,
             glitches: 0,
+            late_in_a_row: 0,
         }
     }
 
@@ -72,12 +80,22 @@ impl FrameClock {
         if self.seen == 1 && frames == 1 {
             self.period = elapsed;
         }
-        let k = i64::from(self.seen);
-        self.seen = (self.seen + 1).min(MEMORY);
         let predicted = self
             .start
             .saturating_add(frames.saturating_mul(self.period));
-        let error = now.saturating_sub(predicted);
+        let mut error = now.saturating_sub(predicted);
+        if self.is_settled() && error.saturating_abs() > MOST_LATE_NS * SCALE {
+            self.late_in_a_row += 1;
+            if self.late_in_a_row >= MOST_LATE {
+                self.restart();
+                return self.vsync(now_ns);
+            }
+            error = 0;
+        } else {
+            self.late_in_a_row = 0;
+        }
+        let k = i64::from(self.seen);
+        self.seen = (self.seen + 1).min(MEMORY);
         let (weights, both) = ((k + 1) * (k + 2), 2 * (2 * k + 1));
         self.start = predicted.saturating_add(error.saturating_mul(both) / weights);
         self.period = (self.period + error.saturating_mul(6) / weights / frames).max(1);
@@ -170,6 +188,22 @@ mod tests {
             assert_eq!(clock.vsync(n * PERIOD_NS * 25 / 24).unwrap().lost, 0);
         }
         assert_eq!(clock.off_nominal_permille(), 41);
+    }
+
+    #[test]
+    fn a_late_interrupt_counts_its_frame_and_moves_nothing() {
+        let mut clock = FrameClock::new(PERIOD_NS);
+        for n in 0..100 {
+            clock.vsync(n * PERIOD_NS);
+        }
+        let late = clock.vsync(100 * PERIOD_NS + 8_000_000).unwrap();
+        assert_eq!((late.frame, late.start_ns), (100, 100 * PERIOD_NS));
+        // A camera that really shifted is followed after a while.
+        for n in 101..200 {
+            clock.vsync(n * PERIOD_NS + 5_000_000);
+        }
+        let after = clock.vsync(200 * PERIOD_NS + 5_000_000).unwrap();
+        assert!((after.start_ns - (200 * PERIOD_NS + 5_000_000)).abs() < 1000);
     }
 
     #[test]

@@ -88,6 +88,14 @@ impl Frames {
         }
     }
 
+    /// Lines may have been missed without notice: what still comes of this frame cannot be numbered.
+    pub fn abandon(&mut self) {
+        if self.frame.take().is_some() {
+            count(&mut self.losses.incomplete_frames, 1);
+        }
+        self.rows_seen = 0;
+    }
+
     /// The camera was started anew: the next line comes after the next VSYNC.
     pub fn restart(&mut self) {
         (self.frame, self.rows_seen) = (None, 0);
@@ -128,6 +136,23 @@ mod tests {
             );
         }
         assert_eq!(frames.losses(), Losses::default());
+    }
+
+    #[test]
+    fn an_abandoned_frame_takes_no_more_lines() {
+        let mut frames = Frames::new(PERIOD_NS, 244);
+        frame(&mut frames, 0, 100);
+        frames.abandon();
+        assert_eq!(frames.line(), None);
+        assert!(frame(&mut frames, 1, 244)[243].is_some());
+        assert_eq!(
+            frames.losses(),
+            Losses {
+                lost_frames: 0,
+                incomplete_frames: 1,
+                stray_lines: 1
+            }
+        );
     }
 
     #[test]

@@ -15,3 +15,4 @@ pub mod health;
 pub mod hm01b0;
 pub mod led;
 pub mod memory;
+pub mod plan;
