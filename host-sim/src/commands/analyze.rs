@@ -25,20 +25,20 @@ pub struct Args {
     #[command(flatten)]
     camera: CameraArgs,
     /// Length of a window, s
-    #[arg(long, value_name = "S", default_value_t = 1.0, value_parser = seconds)]
+    #[arg(long, value_name = "S", default_value_t = 1.0, value_parser = seconds, allow_negative_numbers = true)]
     window: f64,
     /// From one window to the next, s [default: half a window]
-    #[arg(long, value_name = "S", value_parser = seconds)]
+    #[arg(long, value_name = "S", value_parser = seconds, allow_negative_numbers = true)]
     hop: Option<f64>,
     /// Most peaks reported
     #[arg(long, value_name = "N", default_value_t = 8,
           value_parser = clap::value_parser!(u8).range(1..=MAX_PEAKS as i64))]
     max_peaks: u8,
     /// Lowest frequency looked for, Hz [default: 1.5 periods a window]
-    #[arg(long, value_name = "F", value_parser = hertz)]
+    #[arg(long, value_name = "F", value_parser = hertz, allow_negative_numbers = true)]
     min_hz: Option<f64>,
     /// Highest frequency looked for, Hz [default: 2000; half the frame rate with --global-shutter]
-    #[arg(long, value_name = "F", value_parser = hertz)]
+    #[arg(long, value_name = "F", value_parser = hertz, allow_negative_numbers = true)]
     max_hz: Option<f64>,
     /// Format of the reports on standard output
     #[arg(long, value_enum, default_value = "text")]

@@ -23,19 +23,19 @@ pub struct CameraArgs {
     #[arg(value_name = "INPUT", help_heading = None)]
     pub input: String,
     /// Frame rate, Hz [default: the file's]
-    #[arg(long, value_name = "F", value_parser = positive)]
+    #[arg(long, value_name = "F", value_parser = positive, allow_negative_numbers = true)]
     pub fps: Option<f64>,
     /// Start of exposure of every frame: timecode format v2, ms [default: frame number / fps]
     #[arg(long, value_name = "FILE")]
     pub pts: Option<PathBuf>,
     /// Time from one row to the next, µs
-    #[arg(long, value_name = "T", value_parser = positive, conflicts_with = "global_shutter")]
+    #[arg(long, value_name = "T", value_parser = positive, allow_negative_numbers = true, conflicts_with = "global_shutter")]
     pub line_time_us: Option<f64>,
     /// Takes the line time from a file that `rowtone calibrate` wrote
     #[arg(long, value_name = "FILE", conflicts_with_all = ["line_time_us", "global_shutter"])]
     pub calibration: Option<PathBuf>,
     /// Exposure of a row, µs
-    #[arg(long, value_name = "T", value_parser = not_negative, default_value = "0")]
+    #[arg(long, value_name = "T", value_parser = not_negative, allow_negative_numbers = true, default_value = "0")]
     pub exposure_us: f64,
     /// Part of the picture to use, px; also `full` or `auto` [default: auto]
     #[arg(
@@ -62,7 +62,7 @@ pub struct CameraArgs {
     #[arg(long)]
     pub global_shutter: bool,
     /// Scale: adds µm and mm/s to the output
-    #[arg(long, value_name = "S", value_parser = positive)]
+    #[arg(long, value_name = "S", value_parser = positive, allow_negative_numbers = true)]
     pub um_per_px: Option<f64>,
 }
 

@@ -242,12 +242,17 @@ fn spectrogram(area: &Area<'_>, scene: &Scene<'_>) -> Drawn {
         let height = (band.1 - band.0) / column.len().max(1) as f64;
         let shades: Vec<i32> = column.iter().map(|&px| shade(px)).collect();
         let mut from = 0;
-        // One rectangle for each run of one shade.
+        // One rectangle for each run of one shade, a little larger than it is: what comes next covers
+        // the rest, and no seam shows between them.
+        let seam = (width * 0.1, height * 0.5);
         for run in shades.chunk_by(|a, b| a == b) {
             let to = from + run.len();
             let y = |row: usize| band.0 + height * row as f64;
             chart.draw_series([Rectangle::new(
-                [(x, y(from)), (x + width, y(to))],
+                [
+                    (x, y(from)),
+                    ((x + width + seam.0).min(end), (y(to) + seam.1).min(band.1)),
+                ],
                 colour(run[0]).filled(),
             )])?;
             from = to;
