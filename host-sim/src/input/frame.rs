@@ -1,5 +1,7 @@
 //! One frame in memory, handed out as lines.
 
+use std::ops::Range;
+
 use rowtone::camera::{Line, Pixels, Timing};
 
 use super::{Header, Rect, Turn};
@@ -72,14 +74,15 @@ impl Frame {
         }
     }
 
-    /// The lines of a part of the picture, from its top, numbered from 0. `timing` is the whole
+    /// The lines `rows` of a part of the picture, numbered from its top. `timing` is the whole
     /// picture's: a row's time depends on where it is in the picture.
     pub fn lines<'a>(
         &'a self,
         part: &'a Rect,
         timing: &'a Timing,
+        rows: Range<usize>,
     ) -> impl Iterator<Item = Line<'a>> {
-        (0..part.height).map(move |row| Line {
+        rows.map(move |row| Line {
             frame: self.number,
             row: row as u16,
             start_ns: self.start_ns + timing.start_ns((part.y + row) as u16),
@@ -104,7 +107,7 @@ mod tests {
         frame.prepare(&header, 6, Turn::No);
         let timing = Timing::new(10_000, 0, 3).unwrap();
         let part = "1,1,2,2".parse().unwrap();
-        let lines: Vec<_> = frame.lines(&part, &timing).collect();
+        let lines: Vec<_> = frame.lines(&part, &timing, 0..2).collect();
         assert_eq!(lines.len(), 2);
         assert_eq!(lines[0].pixels, Pixels::U8(b"ef"));
         assert_eq!((lines[1].row, lines[1].start_ns), (1, 120));

@@ -1,5 +1,7 @@
 //! One part of the picture, its tracker and the tracker's memory.
 
+use std::ops::Range;
+
 use rowtone::camera::Timing;
 use rowtone::timeline::Displacement;
 use rowtone::tracker::{Config, ConfigError, Outcome, Storage, Tracker};
@@ -70,6 +72,7 @@ impl std::ops::AddAssign for Unmeasured {
 #[derive(Debug)]
 pub struct Engine<'a> {
     part: Rect,
+    rows: Range<usize>,
     timing: Timing,
     tracker: Tracker<'a>,
 }
@@ -99,14 +102,21 @@ impl<'a> Engine<'a> {
         let tracker = Tracker::new(config, buffers.storage()).map_err(refuse)?;
         Ok(Self {
             part,
+            rows: 0..part.height,
             timing,
             tracker,
         })
     }
 
+    /// Only these rows of the part are measured, counted from its top.
+    pub fn only_rows(mut self, rows: Range<usize>) -> Self {
+        self.rows = rows;
+        self
+    }
+
     /// Shows the tracker a frame while it learns.
     pub fn learn(&mut self, frame: &Frame) {
-        for line in frame.lines(&self.part, &self.timing) {
+        for line in frame.lines(&self.part, &self.timing, self.rows.clone()) {
             self.tracker.push(&line);
         }
     }
@@ -119,7 +129,7 @@ impl<'a> Engine<'a> {
     /// Measures every line of a frame and appends what came of it to `to`.
     pub fn measure(&mut self, frame: &Frame, to: &mut Vec<Displacement>) -> Unmeasured {
         let mut unmeasured = Unmeasured::default();
-        for line in frame.lines(&self.part, &self.timing) {
+        for line in frame.lines(&self.part, &self.timing, self.rows.clone()) {
             match self.tracker.push(&line) {
                 Outcome::Measured(displacement) => to.push(displacement),
                 Outcome::NoTexture | Outcome::Misfit => unmeasured.no_texture += 1,

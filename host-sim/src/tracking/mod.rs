@@ -8,6 +8,7 @@
 
 mod background;
 mod engine;
+mod region;
 
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 
@@ -15,6 +16,7 @@ use rowtone::timeline::Displacement;
 
 pub use background::subtract;
 pub use engine::{Buffers, Engine, Unmeasured};
+use region::Region;
 
 use crate::failure::Failure;
 use crate::input::{Camera, Feed, Frame, Rect};
@@ -45,7 +47,11 @@ pub struct FrameShifts {
 enum Message {
     Frame(FrameShifts),
     Failed(Failure),
-    Done { warning: Option<String> },
+    /// Something to tell the user at once.
+    Note(String),
+    Done {
+        warning: Option<String>,
+    },
 }
 
 /// The displacements of a recording, frame by frame.
@@ -102,19 +108,22 @@ impl Shifts {
     /// [`Failure::Input`] when the input turns out to be unusable at this point; what came before was
     /// good.
     pub fn next_frame(&mut self) -> Result<Option<FrameShifts>, Failure> {
-        match self.messages.recv() {
-            Ok(Message::Frame(mut frame)) => {
-                if self.camera.background.is_some() {
-                    background::subtract(&mut frame.rows, &frame.still);
+        loop {
+            match self.messages.recv() {
+                Ok(Message::Frame(mut frame)) => {
+                    if self.camera.background.is_some() {
+                        background::subtract(&mut frame.rows, &frame.still);
+                    }
+                    return Ok(Some(frame));
                 }
-                Ok(Some(frame))
+                Ok(Message::Note(note)) => eprintln!("rowtone: {}: {note}", self.name),
+                Ok(Message::Failed(failure)) => return Err(failure),
+                Ok(Message::Done { warning }) => {
+                    self.warning = warning;
+                    return Ok(None);
+                }
+                Err(_) => return Ok(None),
             }
-            Ok(Message::Failed(failure)) => Err(failure),
-            Ok(Message::Done { warning }) => {
-                self.warning = warning;
-                Ok(None)
-            }
-            Err(_) => Ok(None),
         }
     }
 
@@ -130,17 +139,56 @@ impl Shifts {
 }
 
 /// The line thread.
-fn run(feed: Feed, part: Rect, to: &SyncSender<Message>, used: &Receiver<FrameShifts>) {
+fn run(mut feed: Feed, part: Rect, to: &SyncSender<Message>, used: &Receiver<FrameShifts>) {
     let mut buffers = Buffers::new(&part);
     let mut still_buffers = feed.camera.background.as_ref().map(Buffers::new);
-    let outcome = Lines::new(feed, part, &mut buffers, still_buffers.as_mut())
-        .and_then(|mut lines| lines.run(to, used));
+    let (kept, ending) = keep_first(&mut feed);
+    let whole = Region::whole(&part);
+    let region = match feed.camera.part.is_none() {
+        true => region::choose(&kept, &part),
+        false => whole.clone(),
+    };
+    if region != whole {
+        let _ = to.send(Message::Note(told(&region)));
+    }
+    let outcome = Lines::new(feed, part, &region, &mut buffers, still_buffers.as_mut())
+        .and_then(|mut lines| lines.run(kept, ending, to, used));
     let message = match outcome {
         Ok(warning) => Message::Done { warning },
         Err(failure) => Message::Failed(failure),
     };
     // Nobody listens any more: then nobody needs to know.
     let _ = to.send(message);
+}
+
+/// What `--roi auto` chose.
+fn told(region: &Region) -> String {
+    let Region { columns, rows } = region;
+    format!(
+        "--roi auto measures {},{},{},{}: the rest stands still (--roi full for all of it)",
+        columns.start,
+        rows.start,
+        columns.len(),
+        rows.len()
+    )
+}
+
+/// The frames to learn from, and whether more follow.
+fn keep_first(feed: &mut Feed) -> (Vec<Frame>, Result<bool, Failure>) {
+    let (width, height) = feed.camera.size;
+    let most = (LEARN_BYTES / (width * height)).clamp(2, LEARN_FRAMES);
+    let mut kept = Vec::new();
+    while kept.len() < most {
+        match feed.next_frame() {
+            Ok(Some(frame)) => {
+                kept.push(frame);
+                feed.replace();
+            }
+            Ok(None) => return (kept, Ok(false)),
+            Err(failure) => return (kept, Err(failure)),
+        }
+    }
+    (kept, Ok(true))
 }
 
 /// State of the line thread.
@@ -154,6 +202,7 @@ impl<'a> Lines<'a> {
     fn new(
         feed: Feed,
         part: Rect,
+        region: &Region,
         buffers: &'a mut Buffers,
         still_buffers: Option<&'a mut Buffers>,
     ) -> Result<Self, Failure> {
@@ -162,7 +211,13 @@ impl<'a> Lines<'a> {
         let engine = |part, buffers| {
             Engine::new(part, camera.timing, camera.bits, learn, buffers, &feed.name)
         };
-        let moving = engine(part, buffers)?;
+        let columns = Rect {
+            x: region.columns.start,
+            width: region.columns.len(),
+            ..part
+        };
+        let first = region.rows.start - part.y;
+        let moving = engine(columns, buffers)?.only_rows(first..first + region.rows.len());
         let still = match (camera.background, still_buffers) {
             (Some(part), Some(buffers)) => Some(engine(part, buffers)?),
             _ => None,
@@ -177,10 +232,11 @@ impl<'a> Lines<'a> {
     /// Learns, then measures every frame. The warning at the end is the feed's.
     fn run(
         &mut self,
+        kept: Vec<Frame>,
+        mut ending: Result<bool, Failure>,
         to: &SyncSender<Message>,
         used: &Receiver<FrameShifts>,
     ) -> Result<Option<String>, Failure> {
-        let (kept, mut ending) = self.keep_first();
         if kept.len() < 2 {
             ending?;
             return Err(Failure::input(format!(
@@ -218,24 +274,6 @@ impl<'a> Lines<'a> {
             }
         }
         ending.map(|_| self.feed.warning().map(str::to_owned))
-    }
-
-    /// The frames to learn from, and whether more follow.
-    fn keep_first(&mut self) -> (Vec<Frame>, Result<bool, Failure>) {
-        let (width, height) = self.feed.camera.size;
-        let most = (LEARN_BYTES / (width * height)).clamp(2, LEARN_FRAMES);
-        let mut kept = Vec::new();
-        while kept.len() < most {
-            match self.feed.next_frame() {
-                Ok(Some(frame)) => {
-                    kept.push(frame);
-                    self.feed.replace();
-                }
-                Ok(None) => return (kept, Ok(false)),
-                Err(failure) => return (kept, Err(failure)),
-            }
-        }
-        (kept, Ok(true))
     }
 
     /// Measures a frame and sends what came of it. `false` when nobody listens any more.
