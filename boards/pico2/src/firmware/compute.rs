@@ -1,0 +1,114 @@
+//! Samples to windows, windows to reports, on core 1.
+
+use super::shared::{DROPPED_WINDOWS, M, PLAN};
+use core::cell::RefCell;
+use embassy_futures::select::{Either, select};
+use embassy_sync::blocking_mutex::Mutex;
+use embassy_sync::channel::Channel;
+use embassy_sync::signal::Signal;
+use heapless::spsc::{Consumer, Producer, Queue};
+use rowtone::analyzer::{Collector, Reporter};
+use rowtone::camera::Timing;
+use rowtone::report::Report;
+use rowtone::settings::Settings;
+use rowtone::timeline::{Group, Sample};
+use rowtone_pico2::handover::count;
+use rowtone_pico2::memory::SpectrumMemory;
+use rowtone_pico2::plan::{ROWS, spectrum_config};
+use static_cell::StaticCell;
+
+/// Samples on their way: core 1's interrupt takes them at once, unless it is sending or copying a window.
+const WAITING: usize = 128;
+
+static QUEUE: StaticCell<Queue<Sample, WAITING>> = StaticCell::new();
+static PRODUCER: Mutex<M, RefCell<Option<Producer<'static, Sample>>>> =
+    Mutex::new(RefCell::new(None));
+static CONSUMER: Mutex<M, RefCell<Option<Consumer<'static, Sample>>>> =
+    Mutex::new(RefCell::new(None));
+static REPORTER: StaticCell<Reporter<'static>> = StaticCell::new();
+
+/// There are samples in the queue.
+pub(crate) static COME: Signal<M, ()> = Signal::new();
+/// A computer that has nothing to do.
+static IDLE: Channel<M, &'static mut Reporter<'static>, 1> = Channel::new();
+/// One with a window to compute.
+static LOADED: Channel<M, &'static mut Reporter<'static>, 1> = Channel::new();
+/// What it found.
+pub(crate) static REPORTS: Channel<M, Report, 2> = Channel::new();
+
+/// The two halves, on the main stack: making a reporter moves its 8 KiB about.
+///
+/// They are made for some plan; the first one of core 0 sets them right before a sample comes.
+#[inline(never)]
+pub(crate) fn set_up(
+    memory: &'static mut SpectrumMemory,
+) -> (Collector<'static>, &'static mut Reporter<'static>) {
+    let (producer, consumer) = QUEUE.init(Queue::new()).split();
+    PRODUCER.lock(|p| p.replace(Some(producer)));
+    CONSUMER.lock(|c| c.replace(Some(consumer)));
+    let storage = memory.lend();
+    let config = spectrum_config(&Settings::default());
+    // Constants that fit, as a test of the plan shows for the defaults.
+    let group = Timing::new(67_200_000, 0, ROWS)
+        .ok()
+        .and_then(|timing| Group::new(timing, 4).ok());
+    let group = group.expect("a group of the default timing");
+    let collector = Collector::new(&config, group, storage.collected).expect("room to collect");
+    let reporter = Reporter::new(config, group, storage.estimator).expect("room to compute");
+    (collector, REPORTER.init(reporter))
+}
+
+/// The queue's end on core 0; once.
+pub(crate) fn samples() -> Option<Producer<'static, Sample>> {
+    PRODUCER.lock(|p| p.take())
+}
+
+/// Collects samples, and hands complete windows over.
+#[embassy_executor::task]
+pub(crate) async fn collect(mut collector: Collector<'static>) {
+    let Some(mut samples) = CONSUMER.lock(|c| c.take()) else {
+        return;
+    };
+    let mut due = None;
+    loop {
+        match select(PLAN.wait(), COME.wait()).await {
+            Either::First(plan) => {
+                while samples.dequeue().is_some() {} // of the plan before
+                match Collector::new(&plan.spectrum, plan.group, collector.into_storage()) {
+                    Ok(anew) => collector = anew,
+                    // The plan was checked against this memory.
+                    Err(_) => panic!("no room to collect"),
+                }
+                due = Some(plan);
+            }
+            Either::Second(()) => {
+                while let Some(sample) = samples.dequeue() {
+                    if !collector.push(sample) {
+                        continue;
+                    }
+                    let Ok(reporter) = IDLE.try_receive() else {
+                        count(&DROPPED_WINDOWS);
+                        continue;
+                    };
+                    if let Some(plan) = due.take() {
+                        // It was checked with the collector.
+                        let _ = reporter.restart(plan.spectrum, plan.group);
+                    }
+                    collector.hand_over(reporter);
+                    let _ = LOADED.try_send(reporter); // there is but one
+                }
+            }
+        }
+    }
+}
+
+/// Computes one window after the other; some tenths of a second each.
+#[embassy_executor::task]
+pub(crate) async fn compute(mut reporter: &'static mut Reporter<'static>) {
+    loop {
+        let _ = IDLE.try_send(reporter);
+        reporter = LOADED.receive().await;
+        let report = reporter.report();
+        REPORTS.send(report).await;
+    }
+}

@@ -1,0 +1,106 @@
+//! Each line through the tracker, on core 0.
+
+use super::shared::{
+    CAMERA, DROPPED_SAMPLES, FRAMES, LINE_LOSSES, M, MEASURING, PLAN, PLAN_ANEW, SETTINGS,
+};
+use super::{Picture, compute};
+use core::sync::atomic::Ordering;
+use rowtone::camera::{Line, Pixels};
+use rowtone::settings::Region;
+use rowtone::timeline::{Binner, Sample};
+use rowtone::tracker::{Outcome, Stage, Tracker};
+use rowtone_pico2::capture::LINE_PIXELS;
+use rowtone_pico2::handover::{LineBuffer, Taker, count};
+use rowtone_pico2::plan::Plan;
+
+/// Plans, learns and measures, until a new plan is due; for ever.
+#[embassy_executor::task]
+pub(crate) async fn work(mut taker: Taker<'static, M>, picture: &'static mut Picture) {
+    let Some(mut samples) = compute::samples() else {
+        return;
+    };
+    loop {
+        MEASURING.store(false, Ordering::Relaxed);
+        PLAN_ANEW.store(false, Ordering::Relaxed);
+        let plan = plan(&mut taker).await;
+        let Ok(mut tracker) = Tracker::new(plan.tracker(), picture.lend()) else {
+            defmt::error!("the tracker refuses the plan");
+            continue;
+        };
+        defmt::info!("measuring lines of {} ps", plan.timing.line_time_ps());
+        let mut binner = Binner::new(plan.group);
+        PLAN.signal(plan);
+        while !PLAN_ANEW.load(Ordering::Relaxed) {
+            if let Some(sample) = taker
+                .work(|line| measure(line, &plan, &mut tracker, &mut binner))
+                .await
+            {
+                match samples.enqueue(sample) {
+                    Ok(()) => compute::COME.signal(()),
+                    Err(_) => count(&DROPPED_SAMPLES),
+                }
+            }
+            MEASURING.store(tracker.stage() == Stage::Tracking, Ordering::Relaxed);
+        }
+    }
+}
+
+/// Waits until the camera's rhythm is known and the settings are there.
+async fn plan(taker: &mut Taker<'static, M>) -> Plan {
+    loop {
+        taker.work(|_| ()).await;
+        let Some(settings) = SETTINGS.lock(|s| *s.borrow()) else {
+            continue;
+        };
+        let plan = FRAMES.lock(|frames| {
+            let frames = frames.borrow();
+            let clock = frames.clock();
+            clock
+                .is_settled()
+                .then(|| Plan::new(&settings, &CAMERA, clock))
+                .flatten()
+        });
+        if let Some(plan) = plan {
+            return plan;
+        }
+    }
+}
+
+fn measure(
+    buffer: &LineBuffer,
+    plan: &Plan,
+    tracker: &mut Tracker<'_>,
+    binner: &mut Binner,
+) -> Option<Sample> {
+    let Region {
+        x,
+        y,
+        width,
+        height,
+    } = plan.roi;
+    let row = buffer
+        .place
+        .row
+        .checked_sub(y)
+        .filter(|&row| row < height)?;
+    let mut bytes = [0; LINE_PIXELS];
+    if buffer.pixels(&mut bytes).is_err() {
+        count(&LINE_LOSSES.short);
+        return None;
+    }
+    let pixels = bytes.get(usize::from(x)..)?.get(..usize::from(width))?;
+    let start_ns = buffer
+        .place
+        .frame_start_ns
+        .saturating_add(plan.timing.start_ns(row));
+    let line = Line {
+        frame: buffer.place.frame,
+        row,
+        start_ns,
+        pixels: Pixels::U8(pixels),
+    };
+    match tracker.push(&line) {
+        Outcome::Measured(displacement) => binner.push(displacement),
+        _ => None,
+    }
+}

@@ -1,0 +1,123 @@
+//! The serial line, in core 1's interrupt.
+
+use super::compute::REPORTS;
+use super::keep::Remote;
+use super::shared::{CAMERA_STATE, CORE1_ALIVE, PLAN_ANEW, SETTINGS};
+use core::fmt::Write as _;
+use core::sync::atomic::Ordering;
+use embassy_futures::select::{Either4, select4};
+use embassy_rp::uart::{BufferedUart, BufferedUartTx};
+use embassy_time::{Duration, Instant, Timer};
+use embedded_io_async::{Read, Write};
+use heapless::String;
+use rowtone::link::Link;
+use rowtone::outbox::Outbox;
+use rowtone::report::Report;
+use rowtone::settings::store::Started;
+use rowtone::settings::{Board, Console, Settings, Wire};
+use rowtone_pico2::boot::Boot;
+use rowtone_pico2::plan::LIMITS;
+use static_cell::ConstStaticCell;
+
+/// Speed of the serial line.
+pub(crate) const BAUD: u32 = 115_200;
+
+/// Reports that are kept to be sent again.
+static KEPT: ConstStaticCell<[Option<Report>; 8]> = ConstStaticCell::new([const { None }; 8]);
+
+const BOARD: Board = Board {
+    version: [0, 1, 0],
+    limits: LIMITS,
+    defaults: DEFAULTS,
+};
+
+const DEFAULTS: Settings = Settings {
+    window_s: 1.0,
+    hop_s: 0.5,
+    max_peaks: 8,
+    false_alarm: 1e-3,
+    um_per_px: None,
+    roi: None,
+    min_hz: None,
+    max_hz: None,
+    wire: Wire::Text,
+    unit: 1,
+};
+
+/// Says reports, answers commands.
+#[embassy_executor::task]
+pub(crate) async fn talk(uart: BufferedUart, boot: Boot, started: Started) {
+    let (mut out, mut input) = uart.split();
+    // The defaults are constants within the limits, as a test of the library shows.
+    let Ok(console) = Console::new(BOARD, started) else {
+        return;
+    };
+    let mut link = Link::new(console, Outbox::new(KEPT.take()), BAUD);
+    let mut store = Remote;
+    SETTINGS.lock(|s| s.replace(Some(*link.console().settings())));
+    note(
+        &mut out,
+        &link,
+        format_args!("rowtone {}: {boot}", env!("CARGO_PKG_VERSION")),
+    )
+    .await;
+    link.announce(now_us());
+    let mut byte = [0];
+    loop {
+        CORE1_ALIVE.fetch_add(1, Ordering::Relaxed);
+        // No more than fits the UART's buffer, so that this never waits while samples do.
+        let bytes = link.poll(now_us(), &mut store);
+        let take = bytes.len().min(64);
+        let taken = match bytes.get(..take) {
+            Some(chunk) if !chunk.is_empty() => out.write(chunk).await.unwrap_or(take),
+            _ => 0,
+        };
+        link.sent(taken);
+        let wait = if taken > 0 { 0 } else { 20 };
+        match select4(
+            input.read(&mut byte),
+            REPORTS.receive(),
+            CAMERA_STATE.wait(),
+            Timer::after_millis(wait),
+        )
+        .await
+        {
+            Either4::First(Ok(1)) => {
+                link.receive(byte[0], now_us(), &mut store);
+                publish(&link);
+            }
+            // Noise on the line: what was garbled fails its check or is no command.
+            Either4::First(_) => {}
+            Either4::Second(report) => link.push(report),
+            Either4::Third(state) => note(&mut out, &link, format_args!("{state}")).await,
+            Either4::Fourth(()) => {}
+        }
+    }
+}
+
+fn now_us() -> u64 {
+    Instant::now().as_micros()
+}
+
+/// Settings that have changed go to core 0, which plans anew.
+fn publish(link: &Link<'_>) {
+    let settings = *link.console().settings();
+    let changed = SETTINGS.lock(|s| s.replace(Some(settings)) != Some(settings));
+    if changed {
+        PLAN_ANEW.store(true, Ordering::Relaxed);
+    }
+}
+
+/// A line for people: `#` and a sentence. A receiver of the text wire waits for `$` and does not see it; the
+/// other wires have no place for it.
+async fn note(out: &mut BufferedUartTx, link: &Link<'_>, text: core::fmt::Arguments<'_>) {
+    if link.console().settings().wire != Wire::Text {
+        return;
+    }
+    let mut line = String::<160>::new();
+    // What does not fit is left out.
+    let _ = write!(line, "# {text}");
+    let _ = out.write_all(line.as_bytes()).await;
+    let _ = out.write_all(b"\r\n").await;
+    Timer::after(Duration::from_micros(1)).await;
+}
