@@ -11,9 +11,9 @@ use rowtone::tracker::{ColumnLearning, RowLearning, Storage};
 /// Samples of a window.
 pub const SAMPLES: usize = 4096;
 /// Frames of a window.
-pub const FRAMES: usize = 128;
+pub const FRAMES: usize = 96;
 /// Samples of a frame.
-pub const SLOTS: usize = 128;
+pub const SLOTS: usize = 96;
 /// Frequencies up to this one are sampled well, where the memory allows.
 pub const MAX_HZ: f32 = 2000.0;
 /// Columns of a row's coefficients that are built anew beside each line: spreads that work thinly.
@@ -25,7 +25,7 @@ pub type SpectrumMemory = StaticStorage<SAMPLES, FRAMES, SLOTS, 8192, 10>;
 /// Rows that make a sample, so that a window of `frames` frames fits [`SpectrumMemory`].
 pub fn rows_per_sample(timing: Timing, frames: u32) -> u16 {
     let rows = timeline::rows_per_sample(timing, MAX_HZ, frames, SAMPLES);
-    // 128 slots are enough for every u16 of rows only in groups of so many.
+
     rows.max(timing.rows().div_ceil(SLOTS as u16))
 }
 

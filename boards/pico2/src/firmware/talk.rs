@@ -23,7 +23,7 @@ use static_cell::ConstStaticCell;
 pub(crate) const BAUD: u32 = 115_200;
 
 /// Reports that are kept to be sent again.
-static KEPT: ConstStaticCell<[Option<Report>; 8]> = ConstStaticCell::new([const { None }; 8]);
+static KEPT: ConstStaticCell<[Option<Report>; 4]> = ConstStaticCell::new([const { None }; 4]);
 
 const BOARD: Board = Board {
     version: [0, 1, 0],
