@@ -8,7 +8,7 @@ use microfft::Complex32 as Complex;
 
 use super::fit::Model;
 use super::model::Samples;
-use super::phase::{Frequency, cos_sin};
+use super::phase::{Frequency, cos_sin, sin};
 use super::storage::MAX_GRID;
 
 /// Candidates of one search.
@@ -55,7 +55,7 @@ impl Grid {
         if x < 1e-3 {
             return 1.0;
         }
-        let sinc = libm::sinf(x) / x;
+        let sinc = sin(x) / x;
         (sinc * sinc) * (sinc * sinc)
     }
 }

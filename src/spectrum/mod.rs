@@ -36,4 +36,5 @@ pub use plan::{FrameRatePlan, PlanError};
 pub use storage::{EstimatorStorage, StaticStorage, Storage};
 pub use window::{FrameMark, SampleBuffer, WindowMark};
 
+pub(crate) use phase::sin;
 pub(crate) use window::{pack_weight, skew_of};

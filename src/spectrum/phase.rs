@@ -62,6 +62,16 @@ pub(crate) fn cos_sin(phase: u32) -> (f32, f32) {
     }
 }
 
+/// Sine of an angle, rad, to about 2·10⁻⁷ of its own size where that is small. (libm's works in `f64`, which a
+/// microcontroller has no hardware for.)
+pub(crate) fn sin(angle: f32) -> f32 {
+    if angle.abs() < 0.5 {
+        let x2 = angle * angle;
+        return angle * (1.0 - x2 * (1.0 / 6.0 - x2 * (1.0 / 120.0 - x2 / 5040.0)));
+    }
+    cos_sin(turns(angle * (1.0 / TAU))).1
+}
+
 /// Part of a turn as a phase, for what is added to a frequency's own phase.
 pub(crate) fn turns(turns: f32) -> u32 {
     let whole = libm::floorf(turns);
@@ -81,6 +91,19 @@ mod tests {
             let (c, s) = cos_sin(phase);
             assert!((f64::from(c) - angle.cos()).abs() < 2e-7);
             assert!((f64::from(s) - angle.sin()).abs() < 2e-7);
+        }
+    }
+
+    #[test]
+    fn sin_is_as_good_as_f32() {
+        for i in -20_000..20_000_i32 {
+            let angle = i as f32 * 1.003e-3;
+            let exact = f64::from(angle).sin();
+            let error = (f64::from(sin(angle)) - exact).abs();
+            assert!(
+                error < 2e-6 && (angle.abs() > 0.5 || error <= 2e-7 * exact.abs()),
+                "{angle}"
+            );
         }
     }
 

@@ -9,6 +9,7 @@ use core::fmt;
 
 use super::{Displacement, Sample};
 use crate::camera::Timing;
+use crate::spectrum::sin;
 
 /// Rows of a sample are combined by their information, so none may be worth more than this, 1/px².
 const MOST_INFORMATION: f32 = 1e18;
@@ -120,15 +121,15 @@ impl Group {
         let open = if exposure.abs() < 1e-3 {
             1.0
         } else {
-            libm::sinf(exposure) / exposure
+            sin(exposure) / exposure
         };
         let line = PI * hz * self.timing.line_time_ps() as f32 * 1e-12;
         let rows = self.rows_per_sample as f32;
-        let narrow = libm::sinf(line) * rows;
+        let narrow = sin(line) * rows;
         let rowed = if narrow.abs() < 1e-6 {
             1.0
         } else {
-            libm::sinf(line * rows) / narrow
+            sin(line * rows) / narrow
         };
         (open * rowed).abs()
     }
