@@ -56,6 +56,9 @@ fn a_header_that_lies() {
     assert_failure(&wider, 1, &["100x120"]);
     let colour = lie("colour.y4m", "YUV4MPEG2 W96 H120 F60:1 C420");
     assert_failure(&colour, 1, &["FRAME"]);
+    // Its rows could not even be read out in a frame's time, but it is the header that is wrong.
+    let taller = lie("taller.y4m", "YUV4MPEG2 W96 H240 F60:1 Cmono");
+    assert_failure(&taller, 1, &["96x240"]);
     let huge = lie("huge.y4m", "YUV4MPEG2 W8000 H6000 F60:1 Cmono");
     assert_failure(&huge, 1, &["not even one frame"]);
     let no_rate = lie("no-rate.y4m", "YUV4MPEG2 W96 H120 F0:0 Cmono");

@@ -115,6 +115,11 @@ impl Feed {
         match self.messages.recv() {
             Ok(Message::Frame(frame)) => {
                 self.delivered += 1;
+                if self.delivered == 2
+                    && let Some(doubt) = self.camera.doubt.take()
+                {
+                    return Err(doubt);
+                }
                 Ok(Some(frame))
             }
             Ok(Message::Failed(failure)) => Err(failure),

@@ -101,6 +101,9 @@ pub struct Camera {
     pub turn: Turn,
     /// Scale, µm a pixel.
     pub um_per_px: Option<f64>,
+    /// What is wrong with the options if the header is right about the picture's size, which shows only
+    /// with the second frame.
+    pub doubt: Option<Failure>,
 }
 
 impl Camera {
@@ -198,8 +201,7 @@ impl CameraArgs {
     /// The camera, once the header is known.
     ///
     /// # Errors
-    /// [`Failure::Usage`] for a part outside the picture or a read-out that takes longer than a frame;
-    /// [`Failure::Input`] for a calibration file that cannot be used.
+    /// [`Failure::Usage`] for a part outside the picture; [`Failure::Input`] for a calibration file that cannot be used.
     pub fn camera(&self, header: &Header, fps: f64) -> Result<Camera, Failure> {
         self.check()?;
         let (width, height) = (header.width, header.height);
@@ -215,15 +217,15 @@ impl CameraArgs {
         )
         .map_err(|error| Failure::input(format!("{}: {error}", self.name())))?;
         let readout_s = timing.readout_ns() as f64 * 1e-9;
-        if readout_s * fps > READOUT_SLACK {
-            return Err(Failure::usage(format!(
+        let doubt = (readout_s * fps > READOUT_SLACK).then(|| {
+            Failure::usage(format!(
                 "{} rows of {line_time_us} µs take {:.2} ms, longer than a frame at {fps:.3} fps \
                  ({:.2} ms): check --line-time-us and --fps",
                 size.1,
                 readout_s * 1e3,
                 1e3 / fps
-            )));
-        }
+            ))
+        });
         let turned = |name: &str, part: Rect| {
             if part.fits(width, height) {
                 Ok(self.rotate.part(part, width, height))
@@ -252,6 +254,7 @@ impl CameraArgs {
             background,
             turn: self.rotate,
             um_per_px: self.um_per_px,
+            doubt,
         })
     }
 }
