@@ -106,13 +106,13 @@ impl Scene {
                         .collect()
                 })
             }
-            Self::Photo { sky } => photo(period_px, rows, *sky, seed),
+            Self::Photo { sky } => blurred_down(photo(period_px, rows, *sky, seed), blur_px),
             Self::Plain => Strip {
                 period_px,
                 fineness: 1,
                 values: vec![0.7; period_px * rows],
             },
-            Self::Picture { path } => picture(path, period_px, rows)?,
+            Self::Picture { path } => blurred_down(picture(path, period_px, rows)?, blur_px),
         })
     }
 }
@@ -154,6 +154,13 @@ fn boxes(period_px: usize, rows: usize, in_row: impl Fn(usize) -> Vec<[f64; 2]>)
         fineness: 2,
         values,
     }
+}
+
+/// The lens blurs down the columns too; along the rows the texture does it.
+fn blurred_down(mut strip: Strip, blur_px: f64) -> Strip {
+    let width = strip.period_px * strip.fineness;
+    blur_cols(&mut strip.values, width, blur_px);
+    strip
 }
 
 /// A 1/f field over the whole strip (2-D Fourier synthesis), a harder-edged version of a second one on
