@@ -10,6 +10,7 @@
 //! - [`analysis`]: displacements to reports, in the memory that [`memory`] lends;
 //! - [`output`]: reports, displacements and pictures; [`serial`]: serial ports;
 //! - [`calibrate`]: what a flashing light tells about a camera; [`linear`]: small linear algebra;
+//! - [`spectrum_scenes`]: random displacement samples with known tones, for the spectrum's figures;
 //! - [`commands`]: one file a command, each with its options and what it does;
 //! - [`failure`]: what every command says, and exits with, when it cannot go on.
 
@@ -23,4 +24,5 @@ pub mod memory;
 pub mod output;
 pub mod serial;
 pub mod sim;
+pub mod spectrum_scenes;
 pub mod tracking;

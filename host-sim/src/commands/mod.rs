@@ -18,6 +18,7 @@ pub mod demo;
 pub mod displacement;
 pub mod monitor;
 pub mod simulate;
+pub mod sweep;
 
 /// Measures vibration with a rolling-shutter camera: every row of a frame is a sample in time.
 #[derive(Debug, Parser)]
@@ -47,6 +48,8 @@ enum Command {
     Simulate(simulate::Args),
     /// Line time, read-out, blank time and exposure of a camera, from a flashing light
     Calibrate(calibrate::Args),
+    /// Measures the project's own figures anew, from a seed
+    Sweep(sweep::Args),
 }
 
 fn run(command: &Command) -> Result<(), Failure> {
@@ -57,6 +60,7 @@ fn run(command: &Command) -> Result<(), Failure> {
         Command::Monitor(args) => monitor::run(args),
         Command::Simulate(args) => simulate::run(args),
         Command::Calibrate(args) => calibrate::run(args),
+        Command::Sweep(args) => sweep::run(args),
     }
 }
 

@@ -1,0 +1,56 @@
+//! `rowtone sweep`: the project's own figures, measured anew from a seed.
+
+use std::io::Write;
+
+use crate::failure::Failure;
+use crate::spectrum_scenes::score::Score;
+use crate::spectrum_scenes::table;
+
+/// Options of `rowtone sweep`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  rowtone sweep spectrum --scenes 300 --seed 1")]
+pub struct Args {
+    /// What is measured
+    #[command(subcommand)]
+    what: What,
+}
+
+/// What can be measured.
+#[derive(Debug, clap::Subcommand)]
+enum What {
+    /// Random displacement samples with known tones: what is found, what is not there, errors over their bounds
+    Spectrum(Spectrum),
+}
+
+/// Options of `rowtone sweep spectrum`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Columns: tones found; scenes with a peak that is no tone; such peaks a multiple of the frame rate from a tone;
+rms error of frequency and amplitude over their Cramér–Rao bounds, and over their stated deviations.
+
+Example:
+  rowtone sweep spectrum --scenes 300 --seed 1")]
+struct Spectrum {
+    /// Scenes of each kind
+    #[arg(long, default_value_t = 300)]
+    scenes: u64,
+    /// Which series of scenes
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+}
+
+/// Runs the sweep.
+///
+/// # Errors
+/// [`Failure::OutputClosed`] when nobody reads standard output any more.
+pub fn run(args: &Args) -> Result<(), Failure> {
+    let What::Spectrum(options) = &args.what;
+    let mut out = std::io::stdout().lock();
+    let failed = |error| Failure::writing("standard output", &error);
+    writeln!(out, "{}", table::head()).map_err(failed)?;
+    for kind in table::kinds() {
+        let score = Score::of(&kind.ranges, options.seed, options.scenes);
+        writeln!(out, "{}", table::row(kind.name, &score)).map_err(failed)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,123 @@
+//! The analyzer's answer beside the truth.
+
+use rowtone::analyzer::Analyzer;
+use rowtone::report::{Peak, Report};
+use rowtone::spectrum::Config;
+
+use super::scene::{Ranges, Scene};
+use crate::memory::SpectrumMemory;
+
+/// Counts and errors of many scenes.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Score {
+    /// Scenes.
+    pub scenes: usize,
+    /// True tones.
+    pub tones: usize,
+    /// Those found within half of 1/window.
+    pub found: usize,
+    /// Scenes with a peak that is no tone.
+    pub scenes_with_false: usize,
+    /// Peaks that are no tone.
+    pub false_peaks: usize,
+    /// Those of them a multiple of the frame rate away from a tone.
+    pub ghosts: usize,
+    hz_over_bound: f64,
+    amplitude_over_bound: f64,
+    hz_over_sd: f64,
+    amplitude_over_sd: f64,
+}
+
+impl Score {
+    /// Draws and scores `count` scenes.
+    pub fn of(ranges: &Ranges, seed: u64, count: u64) -> Self {
+        let mut score = Self::default();
+        for number in 0..count {
+            let scene = Scene::draw(ranges, seed, number);
+            score.add(&scene, &analyze(&scene));
+        }
+        score
+    }
+
+    /// Adds a scene's report.
+    pub fn add(&mut self, scene: &Scene, report: &Report) {
+        self.scenes += 1;
+        self.tones += scene.tones.len();
+        let reach = 0.5 / scene.window_s;
+        let mut matched = vec![false; report.peaks.len()];
+        for tone in &scene.tones {
+            let near = |p: &Peak| (f64::from(p.hz) - tone.hz).abs();
+            let nearest = report
+                .peaks
+                .iter()
+                .enumerate()
+                .filter(|(i, p)| !matched[*i] && near(p) < reach)
+                .min_by(|a, b| near(a.1).total_cmp(&near(b.1)));
+            let Some((i, peak)) = nearest else { continue };
+            matched[i] = true;
+            self.found += 1;
+            let hz = f64::from(peak.hz) - tone.hz;
+            let amplitude = f64::from(peak.amplitude_px) - tone.amplitude_px;
+            self.hz_over_bound += (hz / tone.hz_bound).powi(2);
+            self.amplitude_over_bound += (amplitude / tone.amplitude_bound_px).powi(2);
+            self.hz_over_sd += (hz / f64::from(peak.hz_sd)).powi(2);
+            self.amplitude_over_sd += (amplitude / f64::from(peak.amplitude_px_sd)).powi(2);
+        }
+        let strays: Vec<f64> = report
+            .peaks
+            .iter()
+            .zip(&matched)
+            .filter(|(_, m)| !**m)
+            .map(|(p, _)| f64::from(p.hz))
+            .collect();
+        self.false_peaks += strays.len();
+        self.scenes_with_false += usize::from(!strays.is_empty());
+        for hz in strays {
+            let ghost = scene.tones.iter().any(|tone| {
+                let k = (hz - tone.hz) / scene.fps;
+                (k - k.round()).abs() * scene.fps < 2.0 * reach && k.round() != 0.0
+            });
+            self.ghosts += usize::from(ghost);
+        }
+    }
+
+    /// Share of the tones found.
+    pub fn found_share(&self) -> f64 {
+        self.found as f64 / self.tones.max(1) as f64
+    }
+
+    /// Share of the scenes with a peak that is no tone.
+    pub fn false_share(&self) -> f64 {
+        self.scenes_with_false as f64 / self.scenes.max(1) as f64
+    }
+
+    /// Errors of found tones, rms: frequency and amplitude over their bounds, then over their stated deviations.
+    pub fn errors(&self) -> [f64; 4] {
+        let n = self.found.max(1) as f64;
+        [
+            self.hz_over_bound,
+            self.amplitude_over_bound,
+            self.hz_over_sd,
+            self.amplitude_over_sd,
+        ]
+        .map(|sum| (sum / n).sqrt())
+    }
+}
+
+/// The report of a scene's only window.
+///
+/// # Panics
+/// When the scene has no samples.
+pub fn analyze(scene: &Scene) -> Report {
+    let config = Config {
+        window_ns: (scene.window_s * 2e9) as i64,
+        ..Config::default()
+    };
+    let mut memory = SpectrumMemory::new(scene.group, scene.window_s, scene.fps);
+    let mut analyzer =
+        Analyzer::new(config, scene.group, memory.lend()).expect("the memory fits the scene");
+    for sample in &scene.samples {
+        analyzer.push(*sample);
+    }
+    analyzer.finish().expect("a scene has samples")
+}
