@@ -77,7 +77,7 @@ impl<'a> Estimator<'a> {
             group,
             storage,
             fit: Fit::new(),
-            model: Model::new(),
+            model: Model::new(0),
             mark: WindowMark::default(),
             loaded: Loaded::default(),
         };
@@ -320,7 +320,7 @@ impl<'a> Estimator<'a> {
         let (mut samples, grid) = view(&mut self.storage, &l, &self.group);
         let outcome = search.run(&mut samples, &mut self.fit, &mut self.model, grid);
         tones.more = outcome.more;
-        let freedom = Fit::freedom(&samples, &self.model.tones).max(1.0);
+        let freedom = Fit::freedom(&samples, &self.model).max(1.0);
         let scale = self.model.squares / freedom;
         // Weights have a mean of one, so this is px² already.
         tones.sample_noise_px = libm::sqrtf(scale);

@@ -16,15 +16,18 @@ pub(crate) struct Model {
     pub(crate) tones: heapless::Vec<Tone, MAX_PEAKS>,
     /// Slow drift: px a window length, px a window length squared.
     pub(crate) drift: [f32; 2],
+    /// How many powers of t the drift has, 0 to 2.
+    pub(crate) drift_powers: usize,
     /// Weighted sum of squares of what is left.
     pub(crate) squares: f32,
 }
 
 impl Model {
-    pub(crate) const fn new() -> Self {
+    pub(crate) const fn new(drift_powers: usize) -> Self {
         Self {
             tones: heapless::Vec::new(),
             drift: [0.0; 2],
+            drift_powers,
             squares: 0.0,
         }
     }
@@ -55,13 +58,17 @@ impl Fit {
     }
 
     /// Degrees of freedom of the residual.
-    pub(crate) fn freedom(samples: &Samples<'_>, tones: &[Tone]) -> f32 {
+    pub(crate) fn freedom(samples: &Samples<'_>, model: &Model) -> f32 {
         let slots = samples.slot_weight[..samples.slots]
             .iter()
             .filter(|&&w| w > 0.0)
             .count();
-        let fitted: usize = tones.iter().map(|t| if t.modulated { 5 } else { 3 }).sum();
-        samples.count as f32 - (slots + drift_powers(samples) + fitted) as f32
+        let fitted: usize = model
+            .tones
+            .iter()
+            .map(|t| if t.modulated { 5 } else { 3 })
+            .sum();
+        samples.count as f32 - (slots + model.drift_powers + fitted) as f32
     }
 
     /// How much of the residual of the last pass is at tone `i` (squared).
@@ -81,7 +88,7 @@ impl Fit {
 
     /// Moves `model` to the least weighted sum of squares; leaves the tables and the normal matrix there.
     pub(crate) fn refine(&mut self, samples: &mut Samples<'_>, model: &mut Model, steps: u32) {
-        let freedom = Self::freedom(samples, &model.tones).max(1.0);
+        let freedom = Self::freedom(samples, model).max(1.0);
         let mut best: Option<Model> = None;
         let mut shorter = 1.0;
         for step in 0..=steps {
@@ -97,14 +104,14 @@ impl Fit {
                     self.evaluate(samples, model);
                     return;
                 }
-                let regressors = Regressors::of(&model.tones, drift_powers(samples));
+                let regressors = Regressors::of(&model.tones, model.drift_powers);
                 self.apply(model, &regressors, shorter, samples.length_s);
                 continue;
             }
             if step == steps {
                 return;
             }
-            let regressors = Regressors::of(&model.tones, drift_powers(samples));
+            let regressors = Regressors::of(&model.tones, model.drift_powers);
             samples.normal(&regressors, &model.tones, &mut self.normal);
             self.normal.factor();
             let gradient = self.gradient(&regressors, slow);
@@ -167,7 +174,7 @@ impl Fit {
         for (i, tone) in model.tones.iter().enumerate() {
             samples.tabulate(i + 1, tone);
         }
-        let regressors = Regressors::of(&model.tones, drift_powers(samples));
+        let regressors = Regressors::of(&model.tones, model.drift_powers);
         samples.normal(&regressors, &model.tones, &mut self.normal);
         self.normal.factor();
         regressors

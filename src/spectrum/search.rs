@@ -4,7 +4,7 @@ use microfft::Complex32 as Complex;
 
 use super::alarm;
 use super::detect::{self, Band, Candidate, LEAST_KEPT};
-use super::fit::{Fit, Model};
+use super::fit::{Fit, Model, drift_powers};
 use super::model::{Samples, Tone};
 
 /// Refinement steps of a trial and of the final fit.
@@ -15,6 +15,29 @@ const CLOSEST: f32 = 0.7;
 
 /// Where the ghosts of a tone are, in frame rates from it.
 const GHOSTS: [f32; 4] = [1.0, -1.0, 2.0, -2.0];
+
+/// With fewer frames, a drift is fitted only where it is seen.
+const FEW_FRAMES: usize = 16;
+
+/// A drift that lowers the sum of squares by more than this many noise variances is seen.
+const DRIFT_SEEN: f32 = 9.0;
+
+/// A tone this near a larger one may come of its changing within the window, turns a window length.
+const BESIDE: f32 = 6.0;
+
+/// Fastest change of frequency tried, turns a window length squared.
+const MOST_CHIRP: f32 = 4.0;
+
+/// Changes of frequency from which a changing tone is refined.
+const CHIRPS: [f32; 7] = [
+    0.0,
+    0.3 * MOST_CHIRP,
+    -0.3 * MOST_CHIRP,
+    0.65 * MOST_CHIRP,
+    -0.65 * MOST_CHIRP,
+    MOST_CHIRP,
+    -MOST_CHIRP,
+];
 
 /// How the search is to be done.
 #[derive(Clone, Copy, Debug)]
@@ -40,7 +63,7 @@ impl Search {
         model: &mut Model,
         grid: &mut [f32],
     ) -> Outcome {
-        *model = Model::new();
+        *model = Model::new(drift_powers(samples));
         fit.refine(samples, model, 2);
         let mut outcome = Outcome::default();
         // Each round adds, exchanges or drops a tone; the bound only guards against going round in circles.
@@ -55,14 +78,35 @@ impl Search {
             }
         }
         fit.refine(samples, model, STEPS);
+        if samples.frames < FEW_FRAMES {
+            self.drop_drift(samples, fit, model);
+        }
         outcome
     }
 
+    /// In few frames a drift and a tone near a multiple of the frame rate are hard to tell apart: a drift that
+    /// explains no more than noise would is taken for none.
+    fn drop_drift(&self, samples: &mut Samples<'_>, fit: &mut Fit, model: &mut Model) {
+        let freedom = Fit::freedom(samples, model).max(1.0);
+        for powers in 0..model.drift_powers {
+            let mut trial = model.clone();
+            trial.drift_powers = powers;
+            trial.drift = [0.0; 2];
+            fit.refine(samples, &mut trial, STEPS);
+            let worse = (trial.squares - model.squares) / model.squares * freedom;
+            if worse < DRIFT_SEEN && self.sound(samples, &trial) {
+                *model = trial;
+                return;
+            }
+        }
+        fit.refine(samples, model, 1);
+    }
+
     /// Share by which a tone must lower the sum of squares.
-    fn threshold(&self, samples: &Samples<'_>, tones: &[Tone]) -> f32 {
+    fn threshold(&self, samples: &Samples<'_>, model: &Model) -> f32 {
         // T_e = √(4π·var t) = 1.023 T for samples spread evenly.
         let widths = (self.band.highest_hz - self.band.lowest_hz) * samples.length_s * 1.023;
-        alarm::threshold(self.false_alarm, widths, Fit::freedom(samples, tones) - 3.0)
+        alarm::threshold(self.false_alarm, widths, Fit::freedom(samples, model) - 3.0)
     }
 
     fn add(
@@ -73,14 +117,14 @@ impl Search {
         grid: &mut [f32],
         outcome: &mut Outcome,
     ) -> bool {
-        if Fit::freedom(samples, &model.tones) < 6.0 {
+        if Fit::freedom(samples, model) < 6.0 {
             return false;
         }
         let candidates = detect::candidates(samples, model, grid, self.band);
         let Some(first) = candidates.first().copied() else {
             return false;
         };
-        let share = self.threshold(samples, &model.tones);
+        let share = self.threshold(samples, model);
         if first.gain < 0.4 * share * model.squares {
             return false;
         }
@@ -99,7 +143,10 @@ impl Search {
         }
         match best {
             Some(best) if model.squares - best.squares > share * best.squares => {
-                *model = best;
+                *model = match self.modulate(samples, fit, model, &best) {
+                    Some(modulated) if modulated.squares < best.squares => modulated,
+                    _ => best,
+                };
                 true
             }
             _ => false,
@@ -117,6 +164,55 @@ impl Search {
         trial.tones.push(Tone::steady(candidate.frequency)).ok()?;
         fit.refine(samples, &mut trial, STEPS);
         self.sound(samples, &trial).then_some(trial)
+    }
+
+    /// A tone that changes within the window has others beside it in a steady model. Where the newest tone of `with` is
+    /// near a larger one, gives `model` with that one's frequency and amplitude changing instead.
+    fn modulate(
+        &self,
+        samples: &mut Samples<'_>,
+        fit: &mut Fit,
+        model: &Model,
+        with: &Model,
+    ) -> Option<Model> {
+        let newest = with.tones.last()?;
+        let near = |tone: &Tone| newest.frequency.above(tone.frequency) * samples.length_s;
+        let i = model.tones.iter().position(|t| near(t).abs() < BESIDE)?;
+        let (a, b) = (with.tones.get(i)?, newest);
+        let (pa, pb) = (a.amplitude.norm_sqr(), b.amplitude.norm_sqr());
+        let center = model
+            .tones
+            .get(i)?
+            .frequency
+            .plus(pb / (pa + pb) * b.frequency.above(a.frequency));
+        let length_s = samples.length_s;
+        let mut best: Option<Model> = None;
+        for chirp in CHIRPS {
+            let mut trial = model.clone();
+            let tone = trial.tones.get_mut(i)?;
+            if tone.modulated {
+                return None;
+            }
+            tone.modulated = true;
+            if chirp != 0.0 {
+                *tone = Tone {
+                    modulated: true,
+                    chirp,
+                    ..Tone::steady(center)
+                };
+            }
+            fit.refine(samples, &mut trial, STEPS);
+            let stayed = trial.tones.get(i)?;
+            let sound = stayed.chirp.abs() < 2.0 * MOST_CHIRP
+                && (stayed.frequency.above(center) * length_s).abs() < BESIDE;
+            if sound && best.as_ref().is_none_or(|b| trial.squares < b.squares) {
+                best = Some(trial);
+            }
+            if best.as_ref().is_some_and(|b| b.squares < with.squares) {
+                break;
+            }
+        }
+        best.filter(|b| self.sound(samples, b))
     }
 
     /// Every tone is within the band, not hidden, and apart from the others.
@@ -141,6 +237,9 @@ impl Search {
         };
         let mut changed = false;
         for i in 0..model.tones.len() {
+            if model.tones.get(i).is_none_or(|t| t.modulated) {
+                continue;
+            }
             let ghosts = self.ghosts(samples, fit, model, i, fps);
             let mut without = model.clone();
             without.tones.swap_remove(i);
@@ -205,7 +304,7 @@ impl Search {
 
     /// Drops tones that no longer lower the sum of squares enough beside the others.
     fn drop_weak(&self, samples: &mut Samples<'_>, fit: &mut Fit, model: &mut Model) -> bool {
-        let share = self.threshold(samples, &model.tones);
+        let share = self.threshold(samples, model);
         let regressors = fit.weigh(samples, model);
         let mut weakest: Option<(usize, f32)> = None;
         for (i, tone) in model.tones.iter().enumerate() {
