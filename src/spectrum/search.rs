@@ -6,6 +6,7 @@ use super::alarm;
 use super::detect::{self, Band, Candidate, LEAST_KEPT};
 use super::fit::{Fit, Model, drift_powers};
 use super::model::{Samples, Tone};
+use super::phase::Frequency;
 
 /// Refinement steps of a trial and of the final fit.
 const STEPS: u32 = 8;
@@ -133,12 +134,21 @@ impl Search {
             return false;
         }
         let mut best: Option<Model> = None;
-        for candidate in candidates.iter().filter(|c| c.gain > 0.5 * first.gain) {
-            let Some(trial) = self.try_tone(samples, fit, model, candidate) else {
-                continue;
-            };
-            if best.as_ref().is_none_or(|b| trial.squares < b.squares) {
-                best = Some(trial);
+        for candidate in &candidates {
+            // Rivals of the first are its ghosts, or it is theirs; the rest only count where these come to nothing.
+            if best.is_some() && candidate.gain < 0.5 * first.gain {
+                break;
+            }
+            for start in [
+                Some(candidate.frequency),
+                self.mirrored(samples, candidate.frequency),
+            ] {
+                let trial = start.and_then(|f| self.try_tone(samples, fit, model, f));
+                if let Some(trial) = trial
+                    && best.as_ref().is_none_or(|b| trial.squares < b.squares)
+                {
+                    best = Some(trial);
+                }
             }
         }
         match best {
@@ -153,15 +163,24 @@ impl Search {
         }
     }
 
+    /// Near a multiple of the frame rate a tone looks much like one as far on the multiple's other side, and no small
+    /// steps lead across: the place to try as well.
+    fn mirrored(&self, samples: &Samples<'_>, frequency: Frequency) -> Option<Frequency> {
+        let fps = self.band.fps?;
+        let hz = frequency.hz();
+        let away = hz - fps * libm::roundf(hz / fps);
+        (away.abs() * samples.length_s < 1.0).then(|| frequency.plus(-2.0 * away))
+    }
+
     fn try_tone(
         &self,
         samples: &mut Samples<'_>,
         fit: &mut Fit,
         model: &Model,
-        candidate: &Candidate,
+        start: Frequency,
     ) -> Option<Model> {
         let mut trial = model.clone();
-        trial.tones.push(Tone::steady(candidate.frequency)).ok()?;
+        trial.tones.push(Tone::steady(start)).ok()?;
         fit.refine(samples, &mut trial, STEPS);
         self.sound(samples, &trial).then_some(trial)
     }
@@ -244,7 +263,7 @@ impl Search {
             let mut without = model.clone();
             without.tones.swap_remove(i);
             for candidate in &ghosts {
-                if let Some(trial) = self.try_tone(samples, fit, &without, candidate)
+                if let Some(trial) = self.try_tone(samples, fit, &without, candidate.frequency)
                     && trial.squares < 0.9999 * model.squares
                 {
                     *model = trial;
