@@ -14,8 +14,9 @@ use super::storage::MAX_GRID;
 /// Candidates of one search.
 pub(crate) const CANDIDATES: usize = 4;
 
-/// A tone of which less than this share is left after the projection is not looked for: it is hidden.
-pub(crate) const LEAST_KEPT: f32 = 0.03;
+/// Where less than this share of a tone is left after the projection, noise is not divided by it; such a tone shows
+/// beside the multiple of the frame rate that hides it.
+const LEAST_KEPT: f32 = 0.03;
 
 /// Where a tone may be.
 #[derive(Clone, Copy, Debug)]

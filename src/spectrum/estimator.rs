@@ -14,6 +14,10 @@ use crate::timeline::Group;
 /// be guessed.
 const LEAST_ATTENUATION: f32 = 0.05;
 
+/// A tone of which the amplitude is not known better than this (over its standard deviation) is no peak: it is all
+/// but hidden by a multiple of the frame rate.
+const LEAST_KNOWN: f32 = 3.0;
+
 /// Tones nearer than this many 1/T to a multiple of the frame rate are ambiguous.
 const NEAR_MULTIPLE: f32 = 1.0;
 
@@ -361,7 +365,9 @@ impl<'a> Estimator<'a> {
                 track: 0,
                 harmonic: None,
             };
-            let sound = peak.hz_sd.is_finite()
+            let known = peak.amplitude_px > LEAST_KNOWN * peak.amplitude_px_sd;
+            let sound = known
+                && peak.hz_sd.is_finite()
                 && peak.amplitude_px.is_finite()
                 && peak.amplitude_px_sd.is_finite();
             if sound {

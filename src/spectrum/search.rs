@@ -3,13 +3,13 @@
 use microfft::Complex32 as Complex;
 
 use super::alarm;
-use super::detect::{self, Band, Candidate, LEAST_KEPT};
+use super::detect::{self, Band, Candidate};
 use super::fit::{Fit, Model, drift_powers};
 use super::model::{Samples, Tone};
 use super::phase::Frequency;
 
 /// Refinement steps of a trial and of the final fit.
-const STEPS: u32 = 8;
+const STEPS: u32 = 12;
 
 /// Tones nearer than this are one, turns a window length.
 const CLOSEST: f32 = 0.7;
@@ -22,6 +22,12 @@ const FEW_FRAMES: usize = 16;
 
 /// A drift that lowers the sum of squares by more than this many noise variances is seen.
 const DRIFT_SEEN: f32 = 9.0;
+
+/// Starts near a multiple of the frame rate, turns a window length from it.
+const NEARER: [f32; 4] = [0.15, -0.15, 0.04, -0.04];
+
+/// A fitted tone keeps at least this share of its energy in the projection.
+const LEAST_KEPT: f32 = 3e-5;
 
 /// A tone this near a larger one may come of its changing within the window, turns a window length.
 const BESIDE: f32 = 6.0;
@@ -139,11 +145,8 @@ impl Search {
             if best.is_some() && candidate.gain < 0.5 * first.gain {
                 break;
             }
-            for start in [
-                Some(candidate.frequency),
-                self.mirrored(samples, candidate.frequency),
-            ] {
-                let trial = start.and_then(|f| self.try_tone(samples, fit, model, f));
+            for start in self.starts(samples, candidate.frequency) {
+                let trial = self.try_tone(samples, fit, model, start);
                 if let Some(trial) = trial
                     && best.as_ref().is_none_or(|b| trial.squares < b.squares)
                 {
@@ -163,13 +166,28 @@ impl Search {
         }
     }
 
-    /// Near a multiple of the frame rate a tone looks much like one as far on the multiple's other side, and no small
-    /// steps lead across: the place to try as well.
-    fn mirrored(&self, samples: &Samples<'_>, frequency: Frequency) -> Option<Frequency> {
-        let fps = self.band.fps?;
+    /// Where to refine a candidate from. Near a multiple of the frame rate a tone looks much like one as far on the
+    /// multiple's other side, or nearer to it and larger, and no small steps lead from one to the other.
+    fn starts(
+        &self,
+        samples: &Samples<'_>,
+        frequency: Frequency,
+    ) -> heapless::Vec<Frequency, { 2 + NEARER.len() }> {
+        let mut starts = heapless::Vec::new();
+        // There is room for all of them.
+        let _ = starts.push(frequency);
+        let Some(fps) = self.band.fps else {
+            return starts;
+        };
         let hz = frequency.hz();
         let away = hz - fps * libm::roundf(hz / fps);
-        (away.abs() * samples.length_s < 1.0).then(|| frequency.plus(-2.0 * away))
+        if away.abs() * samples.length_s < 1.0 {
+            let _ = starts.push(frequency.plus(-2.0 * away));
+            for turns in NEARER {
+                let _ = starts.push(frequency.plus(turns / samples.length_s - away));
+            }
+        }
+        starts
     }
 
     fn try_tone(
