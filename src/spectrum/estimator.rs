@@ -101,7 +101,7 @@ impl<'a> Estimator<'a> {
             return Err(error);
         }
         self.config = config;
-        self.model = Model::new();
+        self.model = Model::new(0);
         self.mark = WindowMark::default();
         self.loaded = Loaded::default();
         Ok(())
