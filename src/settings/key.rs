@@ -2,6 +2,7 @@
 
 use core::fmt;
 
+use super::real::{self, Real};
 use super::{Region, Settings, Wire};
 
 /// Name of a setting; the same names as the options of the command `rowtone`.
@@ -93,7 +94,7 @@ impl Key {
     /// The text is not a value of this setting; `settings` is as before.
     pub fn set(self, settings: &mut Settings, text: &str) -> Result<(), ValueError> {
         let wrong = ValueError(self);
-        let number = |text: &str| text.parse::<f32>().map_err(|_| wrong);
+        let number = |text: &str| real::parse(text).ok_or(wrong);
         let optional = |text: &str| match text {
             "none" => Ok(None),
             text => number(text).map(Some),
@@ -132,14 +133,14 @@ impl Key {
     pub fn write(self, settings: &Settings, out: &mut impl fmt::Write) -> fmt::Result {
         write!(out, "{}=", self.name())?;
         let optional = |out: &mut dyn fmt::Write, value: Option<f32>| match value {
-            Some(value) => write!(out, "{value}"),
+            Some(value) => write!(out, "{}", Real(value)),
             None => out.write_str("none"),
         };
         match self {
-            Self::Window => write!(out, "{}", settings.window_s),
-            Self::Hop => write!(out, "{}", settings.hop_s),
+            Self::Window => write!(out, "{}", Real(settings.window_s)),
+            Self::Hop => write!(out, "{}", Real(settings.hop_s)),
             Self::MaxPeaks => write!(out, "{}", settings.max_peaks),
-            Self::FalseAlarm => write!(out, "{}", settings.false_alarm),
+            Self::FalseAlarm => write!(out, "{}", Real(settings.false_alarm)),
             Self::UmPerPx => optional(out, settings.um_per_px),
             Self::Roi => match settings.roi {
                 Some(r) => write!(out, "{},{},{},{}", r.x, r.y, r.width, r.height),

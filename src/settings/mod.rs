@@ -9,6 +9,7 @@ mod check;
 pub mod command;
 mod console;
 mod key;
+mod real;
 pub mod store;
 
 use serde::{Deserialize, Serialize};
