@@ -8,6 +8,7 @@ set -euo pipefail
 
 name=${1:?usage: boards/budget.sh NAME ELF}
 elf=${2:?usage: boards/budget.sh NAME ELF}
+[ -f "$elf" ] || { echo "budget.sh: $elf is not there" >&2; exit 1; }
 max_flash=$((128 * 1024))
 max_ram=$((400 * 1024))
 

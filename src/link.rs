@@ -92,7 +92,7 @@ impl<'a> Link<'a> {
 
     /// Takes a byte from the line that came at `now_us` since the board's start.
     pub fn receive(&mut self, byte: u8, now_us: u64, store: &mut impl Keep) {
-        if self.console.settings().wire == Wire::Modbus {
+        if self.is_modbus() {
             self.frames.push(byte, now_us);
             return;
         }
@@ -130,7 +130,7 @@ impl<'a> Link<'a> {
     fn load(&mut self, now_us: u64, store: &mut impl Keep) {
         // An answer goes out on the wire that is set now, the one to `set wire` included.
         let wire = self.console.settings().wire;
-        if wire == Wire::Modbus {
+        if self.is_modbus() {
             self.answers.clear(); // there is no place for them on this wire
             return self.answer_frame(now_us, store);
         }
@@ -142,6 +142,11 @@ impl<'a> Link<'a> {
             let report = report.clone();
             write(wire, &Message::Report { session, report }, &mut self.buffer);
         }
+    }
+
+    fn is_modbus(&self) -> bool {
+        // Settings with a wire that is left out do not pass their check.
+        cfg!(feature = "modbus") && self.console.settings().wire == Wire::Modbus
     }
 
     fn answer_frame(&mut self, now_us: u64, store: &mut impl Keep) {
@@ -168,9 +173,11 @@ fn write(wire: Wire, message: &Message, buffer: &mut Vec<u8, { text::MAX_LINE }>
     }
     let used = match wire {
         Wire::Text => text::encode_to_slice(message, buffer).map(<[u8]>::len),
-        Wire::Binary => binary::encode_to_slice(message, buffer).map(<[u8]>::len),
-        // No messages on this wire.
-        Wire::Modbus => Ok(0),
+        Wire::Binary if cfg!(feature = "binary") => {
+            binary::encode_to_slice(message, buffer).map(<[u8]>::len)
+        }
+        // No messages on these wires.
+        Wire::Binary | Wire::Modbus => Ok(0),
     };
     buffer.truncate(used.unwrap_or(0));
 }

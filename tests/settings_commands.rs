@@ -98,10 +98,7 @@ fn an_error_says_why_and_nothing_changes() {
         ("set window", "missing: a value"),
         ("set colour 1", "colour: no such setting; try get"),
         ("set window long", "window: long is not a number of seconds"),
-        (
-            "set window NaN",
-            "window is NaN s; give 0.05 to 10; nothing was changed",
-        ),
+        ("set window NaN", "window: NaN is not a number of seconds"),
         (
             "set window 2 hop 3",
             "hop is 3 s; give 0.01 to the window's length, 2; nothing was changed",

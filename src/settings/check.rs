@@ -5,7 +5,7 @@ use core::fmt;
 use crate::report::MAX_PEAKS;
 
 use super::real::Real;
-use super::{Region, Settings};
+use super::{Region, Settings, Wire};
 
 /// What the board's camera and memory allow.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -54,6 +54,8 @@ pub enum SettingsError {
         /// Highest, Hz.
         max_hz: f32,
     },
+    /// This firmware was built without it.
+    Wire(Wire),
     /// Not from 1 to 247.
     Unit(u8),
 }
@@ -94,6 +96,12 @@ impl fmt::Display for SettingsError {
                 Real(*min_hz),
                 Real(*max_hz)
             ),
+            Self::Wire(Wire::Text | Wire::Binary) => {
+                f.write_str("wire is binary; this firmware was built without it")
+            }
+            Self::Wire(Wire::Modbus) => {
+                f.write_str("wire is modbus; this firmware was built without it")
+            }
             Self::Unit(unit) => write!(f, "unit is {unit}; give 1 to 247"),
         }
     }
@@ -129,6 +137,9 @@ impl Settings {
         }
         self.check_roi(limits)?;
         self.check_band()?;
+        if !self.wire.is_built_in() {
+            return Err(SettingsError::Wire(self.wire));
+        }
         if !(1..=247).contains(&self.unit) {
             return Err(SettingsError::Unit(self.unit));
         }

@@ -42,6 +42,17 @@ pub enum Wire {
     Modbus,
 }
 
+impl Wire {
+    /// This build speaks it (features `binary` and `modbus`).
+    pub const fn is_built_in(self) -> bool {
+        match self {
+            Self::Text => true,
+            Self::Binary => cfg!(feature = "binary"),
+            Self::Modbus => cfg!(feature = "modbus"),
+        }
+    }
+}
+
 /// All that can be set.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Settings {

@@ -53,8 +53,12 @@ pub(crate) fn set_up(
         .ok()
         .and_then(|timing| Group::new(timing, 4).ok());
     let group = group.expect("a group of the default timing");
-    let collector = Collector::new(&config, group, storage.collected).ok().expect("room to collect");
-    let reporter = Reporter::new(config, group, storage.estimator).ok().expect("room to compute");
+    let collector = Collector::new(&config, group, storage.collected)
+        .ok()
+        .expect("room to collect");
+    let reporter = Reporter::new(config, group, storage.estimator)
+        .ok()
+        .expect("room to compute");
     (collector, REPORTER.init(reporter))
 }
 

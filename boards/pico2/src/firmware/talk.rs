@@ -17,13 +17,14 @@ use rowtone::settings::store::Started;
 use rowtone::settings::{Board, Console, Settings, Wire};
 use rowtone_pico2::boot::Boot;
 use rowtone_pico2::plan::LIMITS;
-use static_cell::ConstStaticCell;
+use static_cell::StaticCell;
 
 /// Speed of the serial line.
 pub(crate) const BAUD: u32 = 115_200;
 
 /// Reports that are kept to be sent again.
-static KEPT: ConstStaticCell<[Option<Report>; 4]> = ConstStaticCell::new([const { None }; 4]);
+/// (Not a constant: a `None` is not all zeros, and would lie in flash four times.)
+static KEPT: StaticCell<[Option<Report>; 4]> = StaticCell::new();
 
 const BOARD: Board = Board {
     version: [0, 1, 0],
@@ -52,7 +53,11 @@ pub(crate) async fn talk(uart: BufferedUart, boot: Boot, started: Started) {
     let Ok(console) = Console::new(BOARD, started) else {
         return;
     };
-    let mut link = Link::new(console, Outbox::new(KEPT.take()), BAUD);
+    let mut link = Link::new(
+        console,
+        Outbox::new(KEPT.init_with(|| [const { None }; 4])),
+        BAUD,
+    );
     let mut store = Remote;
     SETTINGS.lock(|s| s.replace(Some(*link.console().settings())));
     note(
