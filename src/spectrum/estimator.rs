@@ -375,7 +375,7 @@ impl<'a> Estimator<'a> {
                 let _ = list.push((peak, slope));
             }
         }
-        list.sort_unstable_by(|a, b| b.0.amplitude_px.total_cmp(&a.0.amplitude_px));
+        largest_first(&mut list);
         tones.more |= list.len() > self.config.max_peaks;
         list.truncate(self.config.max_peaks);
         for (peak, slope) in &list {
@@ -405,6 +405,18 @@ impl<'a> Estimator<'a> {
             lowest_hz: (1.0 / l.length_s).min(0.5 * highest_hz),
             highest_hz,
             fps: (l.steady_rate && self.group.slots() > 1).then_some(l.fps),
+        }
+    }
+}
+
+/// Insertion: there are sixteen at most, and the library's sort is 2 KiB of flash.
+fn largest_first(list: &mut [(Peak, f32)]) {
+    for end in 1..list.len() {
+        for i in (0..end).rev() {
+            if list[i].0.amplitude_px >= list[i + 1].0.amplitude_px {
+                break;
+            }
+            list.swap(i, i + 1);
         }
     }
 }
