@@ -239,3 +239,22 @@ fn a_picture_without_texture_is_refused_with_a_reason() {
     let clip = file("plain.y4m", &y4m(plain));
     assert_failure(&on_clip("analyze", &clip, &[]), 1, &["texture"]);
 }
+
+#[test]
+fn a_calibration_file_stands_for_line_time_and_exposure() {
+    let text = "rows = 120\nline_time_s = 1e-4\nexposure_s = 5e-4\nrolling = \"up\"\n";
+    let toml = file("camera.toml", text.as_bytes());
+    let mut upward = config(60);
+    upward.sensor.bottom_up = true;
+    let clip = file("upward.y4m", &y4m(upward));
+    let [clip, toml] = [&clip, &toml].map(|path| path.to_str().unwrap());
+    let args = ["analyze", clip, "--calibration", toml, "--format", "json"];
+    let output = command(args).output().unwrap();
+    let (stdout, stderr) = texts(&output);
+    assert!(output.status.success(), "{stderr}");
+    assert_the_tone(&reports(&stdout)[0]);
+    let output = command(["analyze", clip, "--calibration", "no/such.toml"])
+        .output()
+        .unwrap();
+    assert_failure(&output, 1, &["no/such.toml"]);
+}

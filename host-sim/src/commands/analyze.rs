@@ -106,7 +106,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             path,
             title: title(&shifts),
             band_hz: (args.min_hz.unwrap_or(0.0), plan.max_hz()),
-            exposure_s: args.camera.exposure_us * 1e-6,
+            exposure_s: f64::from(shifts.camera.timing.exposure_ns()) * 1e-9,
             one_a_frame: args.camera.global_shutter,
         })
     });

@@ -76,7 +76,7 @@ pub fn run(_args: &Args) -> Result<(), Failure> {
     ))?;
     let options = CameraArgs {
         line_time_us: Some(f64::from(sensor.line_time_ps) * 1e-6),
-        exposure_us: f64::from(sensor.exposure_ns) * 1e-3,
+        exposure_us: Some(f64::from(sensor.exposure_ns) * 1e-3),
         ..CameraArgs::of("the simulated camera")
     };
     let shifts = Shifts::start(Feed::read(&options, from, None)?)?;

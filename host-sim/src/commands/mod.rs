@@ -1,7 +1,7 @@
 //! The commands, one file each.
 //!
 //! A command is a file `commands/<name>.rs` with `#[derive(clap::Args)] pub struct Args` and
-//! `pub fn run(args: &Args) -> Result<(), Failure>`, and one variant of [`Command`]. Results go to
+//! `pub fn run(args: &Args) -> Result<(), Failure>`, and one variant of `Command`. Results go to
 //! standard output; everything else (progress, warnings, the one line of a [`Failure`]) goes to
 //! standard error.
 

@@ -1,26 +1,31 @@
-//! Calibration files: what `rowtone calibrate` found out about a camera, as TOML.
+//! What `rowtone calibrate` found out about a camera, as the camera options take it.
 
 use std::path::Path;
 
+use crate::calibrate::{Calibration, file::RollingName};
 use crate::failure::Failure;
 
-/// Reads `line_time_s` from a calibration file; other keys are left to whom they concern.
+/// What a calibration file says about the timing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Calibrated {
+    /// Time from one row to the next, s.
+    pub(super) line_time_s: f64,
+    /// Exposure of a row, s, where it was measured.
+    pub(super) exposure_s: Option<f64>,
+    /// The last row is read first.
+    pub(super) upward: bool,
+}
+
+/// Reads a calibration file.
 ///
 /// # Errors
-/// [`Failure::Input`] when the file cannot be read or has no usable `line_time_s`.
-pub(super) fn line_time_s(path: &Path) -> Result<f64, Failure> {
-    let name = path.display();
-    let text = std::fs::read_to_string(path)
-        .map_err(|e| Failure::input(format!("{name}: cannot be read: {e}")))?;
-    text.lines()
-        .filter_map(|line| line.split('#').next())
-        .filter_map(|line| line.split_once('='))
-        .find(|(key, _)| key.trim() == "line_time_s")
-        .and_then(|(_, value)| value.trim().parse().ok())
-        .filter(|s: &f64| s.is_finite() && *s > 0.0)
-        .ok_or_else(|| {
-            Failure::input(format!(
-                "{name}: no usable line_time_s in it: make it with `rowtone calibrate`"
-            ))
-        })
+/// [`Failure::Input`] when it cannot be read or used.
+pub(super) fn read(path: &Path) -> Result<Calibrated, Failure> {
+    let calibration = Calibration::read(path)
+        .map_err(|error| Failure::input(format!("{}: {error}", path.display())))?;
+    Ok(Calibrated {
+        line_time_s: calibration.line_time_s,
+        exposure_s: calibration.exposure_s,
+        upward: calibration.rolling == Some(RollingName::Up),
+    })
 }

@@ -34,9 +34,9 @@ pub struct CameraArgs {
     /// Takes the line time from a file that `rowtone calibrate` wrote
     #[arg(long, value_name = "FILE", conflicts_with_all = ["line_time_us", "global_shutter"])]
     pub calibration: Option<PathBuf>,
-    /// Exposure of a row, µs
-    #[arg(long, value_name = "T", value_parser = not_negative, allow_negative_numbers = true, default_value = "0")]
-    pub exposure_us: f64,
+    /// Exposure of a row, µs [default: the calibration's, else 0]
+    #[arg(long, value_name = "T", value_parser = not_negative, allow_negative_numbers = true)]
+    pub exposure_us: Option<f64>,
     /// Part of the picture to use, px; also `full` or `auto` [default: auto]
     #[arg(
         long,
@@ -133,7 +133,7 @@ impl CameraArgs {
             pts: None,
             line_time_us: None,
             calibration: None,
-            exposure_us: 0.0,
+            exposure_us: None,
             roi: Roi::Auto,
             background: None,
             rotate: Turn::No,
@@ -175,7 +175,11 @@ impl CameraArgs {
             self.line_time_us.unwrap_or(0.0),
             LONGEST_LINE_TIME_US,
         )?;
-        limit("--exposure-us", self.exposure_us, LONGEST_EXPOSURE_US)
+        limit(
+            "--exposure-us",
+            self.exposure_us.unwrap_or(0.0),
+            LONGEST_EXPOSURE_US,
+        )
     }
 
     /// The times of the frames.
@@ -205,14 +209,29 @@ impl CameraArgs {
     pub fn camera(&self, header: &Header, fps: f64) -> Result<Camera, Failure> {
         self.check()?;
         let (width, height) = (header.width, header.height);
-        let line_time_us = match (&self.calibration, self.line_time_us) {
-            (Some(path), _) => calibration::line_time_s(path)? * 1e6,
+        let calibrated = self
+            .calibration
+            .as_deref()
+            .map(calibration::read)
+            .transpose()?;
+        let line_time_us = match (calibrated, self.line_time_us) {
+            (Some(calibrated), _) => calibrated.line_time_s * 1e6,
             (None, given) => given.unwrap_or(0.0),
         };
-        let size = self.rotate.size(width, height);
+        let measured = calibrated.and_then(|calibrated| calibrated.exposure_s);
+        let exposure_us = self
+            .exposure_us
+            .or(measured.map(|s| s * 1e6))
+            .unwrap_or(0.0);
+        // A sensor that reads its last row first: turned upside down, rows are in order of time again.
+        let turn = match calibrated {
+            Some(calibrated) if calibrated.upward => self.rotate.upside_down(),
+            _ => self.rotate,
+        };
+        let size = turn.size(width, height);
         let timing = Timing::new(
             (line_time_us.min(LONGEST_LINE_TIME_US) * 1e6).round() as u32,
-            (self.exposure_us * 1e3).round() as u32,
+            (exposure_us.min(LONGEST_EXPOSURE_US) * 1e3).round() as u32,
             size.1 as u16,
         )
         .map_err(|error| Failure::input(format!("{}: {error}", self.name())))?;
@@ -228,7 +247,7 @@ impl CameraArgs {
         });
         let turned = |name: &str, part: Rect| {
             if part.fits(width, height) {
-                Ok(self.rotate.part(part, width, height))
+                Ok(turn.part(part, width, height))
             } else {
                 Err(Failure::usage(format!(
                     "{name} {},{},{},{} is not inside the picture of {width}x{height}",
@@ -252,7 +271,7 @@ impl CameraArgs {
             size,
             part,
             background,
-            turn: self.rotate,
+            turn,
             um_per_px: self.um_per_px,
             doubt,
         })

@@ -130,6 +130,16 @@ impl FromStr for Turn {
 }
 
 impl Turn {
+    /// This, and 180 degrees more.
+    pub const fn upside_down(self) -> Self {
+        match self {
+            Self::No => Self::Half,
+            Self::Quarter => Self::ThreeQuarters,
+            Self::Half => Self::No,
+            Self::ThreeQuarters => Self::Quarter,
+        }
+    }
+
     /// Width and height after turning.
     pub const fn size(self, width: usize, height: usize) -> (usize, usize) {
         match self {
