@@ -74,7 +74,7 @@ impl<'a> Analyzer<'a> {
         ready.then(|| self.reporter.report())
     }
 
-    /// The last window, at the end of the input: where at least half a hop of frames came after the window before, or
+    /// The last window, at the end of the input: where at least two fifths of a hop of frames came after the window before, or
     /// there was none before. It is as long as the others where there are frames enough.
     pub fn finish(&mut self) -> Option<Report> {
         self.collector.finish();

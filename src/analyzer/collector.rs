@@ -106,7 +106,7 @@ impl<'a> Collector<'a> {
         false
     }
 
-    /// The input ends: what has come since the last window becomes one, if it is half a hop or more.
+    /// The input ends: what has come since the last window becomes one, if it is two fifths of a hop or more.
     pub fn finish(&mut self) -> bool {
         if self.ready.is_some() {
             return true;
@@ -121,7 +121,7 @@ impl<'a> Collector<'a> {
         let period = self.period_ns().unwrap_or(self.group.timing().readout_ns());
         let end = newest.start_ns.saturating_add(period.max(1));
         let fresh = match self.done_ns {
-            Some(done) => end.saturating_sub(done) * 2 >= self.hop_ns.min(self.window_ns),
+            Some(done) => end.saturating_sub(done).saturating_mul(5) >= self.hop_ns.min(self.window_ns).saturating_mul(2),
             None => true,
         };
         let done = fresh && self.complete(end);

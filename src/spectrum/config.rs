@@ -25,6 +25,9 @@ pub struct Config {
     pub max_peaks: usize,
     /// Share of windows of pure noise that report a peak. Default 1 in 1000.
     pub false_alarm: f32,
+    /// Most passes over a window's samples, at least 20: bounds the time a window takes. A tone costs about 10, near a
+    /// multiple of the frame rate or with changing frequency up to 80. Default 1000.
+    pub max_passes: u32,
     /// Scale of the picture, µm a pixel.
     pub um_per_px: Option<f32>,
 }
@@ -38,6 +41,7 @@ impl Default for Config {
             max_hz: None,
             max_peaks: 8,
             false_alarm: 1e-3,
+            max_passes: 1000,
             um_per_px: None,
         }
     }
@@ -75,6 +79,9 @@ impl Config {
         if !(1e-9..=0.5).contains(&self.false_alarm) {
             return Err(ConfigError::FalseAlarm(self.false_alarm));
         }
+        if self.max_passes < 20 {
+            return Err(ConfigError::MaxPasses(self.max_passes));
+        }
         Ok(())
     }
 }
@@ -96,6 +103,8 @@ pub enum ConfigError {
     MaxPeaks(usize),
     /// `false_alarm` must be from 1e-9 to 0.5.
     FalseAlarm(f32),
+    /// `max_passes` must be at least 20.
+    MaxPasses(u32),
     /// The lent memory does not hold one window.
     Storage {
         /// Which part is too small.
@@ -117,6 +126,7 @@ impl fmt::Display for ConfigError {
             Self::UmPerPx(v) => write!(f, "um_per_px must be above 0, not {v}"),
             Self::MaxPeaks(v) => write!(f, "max_peaks must be from 1 to {MAX_PEAKS}, not {v}"),
             Self::FalseAlarm(v) => write!(f, "false_alarm must be from 1e-9 to 0.5, not {v}"),
+            Self::MaxPasses(v) => write!(f, "max_passes must be at least 20, not {v}"),
             Self::Storage { part, needs, holds } => {
                 write!(
                     f,
@@ -165,6 +175,10 @@ mod tests {
             },
             Config {
                 false_alarm: f32::NAN,
+                ..good
+            },
+            Config {
+                max_passes: 0,
                 ..good
             },
             Config {

@@ -160,6 +160,11 @@ impl<'a> Estimator<'a> {
         &self.group
     }
 
+    /// Passes over the samples that the last window took: what its cost is proportional to.
+    pub const fn passes(&self) -> u32 {
+        self.fit.passes
+    }
+
     /// The window loaded last.
     pub const fn mark(&self) -> &WindowMark {
         &self.mark
@@ -320,6 +325,7 @@ impl<'a> Estimator<'a> {
                 .min(self.config.max_peaks + 4)
                 .min(MAX_PEAKS),
             false_alarm: self.config.false_alarm,
+            most_passes: self.config.max_passes,
         };
         let (mut samples, grid) = view(&mut self.storage, &l, &self.group);
         let outcome = search.run(&mut samples, &mut self.fit, &mut self.model, grid);

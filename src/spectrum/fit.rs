@@ -46,6 +46,8 @@ pub(crate) struct Fit {
     normal: Normal,
     moments: [Moments; MAX_PEAKS],
     unknowns: [f32; MOST],
+    /// Passes over the samples so far.
+    pub(crate) passes: u32,
 }
 
 impl Fit {
@@ -54,6 +56,7 @@ impl Fit {
             normal: Normal::new(),
             moments: [[Complex::new(0.0, 0.0); POWERS]; MAX_PEAKS],
             unknowns: [0.0; MOST],
+            passes: 0,
         }
     }
 
@@ -81,6 +84,7 @@ impl Fit {
         for (i, tone) in model.tones.iter().enumerate() {
             samples.tabulate(i + 1, tone);
         }
+        self.passes = self.passes.saturating_add(1);
         let (squares, slow) = samples.pass(&model.tones, model.drift, &mut self.moments);
         model.squares = squares;
         slow

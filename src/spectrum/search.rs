@@ -52,6 +52,7 @@ pub(crate) struct Search {
     pub(crate) band: Band,
     pub(crate) most_tones: usize,
     pub(crate) false_alarm: f32,
+    pub(crate) most_passes: u32,
 }
 
 /// What a search ended with.
@@ -71,12 +72,16 @@ impl Search {
         grid: &mut [f32],
     ) -> Outcome {
         *model = Model::new(drift_powers(samples));
+        fit.passes = 0;
         fit.refine(samples, model, 2);
         let mut outcome = Outcome::default();
         // Each round adds, exchanges or drops a tone; the bound only guards against going round in circles.
         for _ in 0..3 * self.most_tones + 3 {
             if self.add(samples, fit, model, grid, &mut outcome) {
                 continue;
+            }
+            if self.tired(fit) {
+                break;
             }
             let exchanged = self.exchange(samples, fit, model);
             let dropped = self.drop_weak(samples, fit, model);
@@ -109,6 +114,11 @@ impl Search {
         fit.refine(samples, model, 1);
     }
 
+    /// The passes are used up, but for the last refinement.
+    fn tired(&self, fit: &Fit) -> bool {
+        fit.passes.saturating_add(STEPS) > self.most_passes
+    }
+
     /// Share by which a tone must lower the sum of squares.
     fn threshold(&self, samples: &Samples<'_>, model: &Model) -> f32 {
         // T_e = √(4π·var t) = 1.023 T for samples spread evenly.
@@ -135,7 +145,7 @@ impl Search {
         if first.gain < 0.4 * share * model.squares {
             return false;
         }
-        if model.tones.len() >= self.most_tones {
+        if model.tones.len() >= self.most_tones || self.tired(fit) {
             outcome.more |= first.gain > share * model.squares;
             return false;
         }
@@ -146,6 +156,9 @@ impl Search {
                 break;
             }
             for start in self.starts(samples, candidate.frequency) {
+                if self.tired(fit) {
+                    break;
+                }
                 let trial = self.try_tone(samples, fit, model, start);
                 if let Some(trial) = trial
                     && best.as_ref().is_none_or(|b| trial.squares < b.squares)
@@ -225,6 +238,9 @@ impl Search {
         let length_s = samples.length_s;
         let mut best: Option<Model> = None;
         for chirp in CHIRPS {
+            if self.tired(fit) {
+                break;
+            }
             let mut trial = model.clone();
             let tone = trial.tones.get_mut(i)?;
             if tone.modulated {
@@ -274,7 +290,7 @@ impl Search {
         };
         let mut changed = false;
         for i in 0..model.tones.len() {
-            if model.tones.get(i).is_none_or(|t| t.modulated) {
+            if self.tired(fit) || model.tones.get(i).is_none_or(|t| t.modulated) {
                 continue;
             }
             let ghosts = self.ghosts(samples, fit, model, i, fps);

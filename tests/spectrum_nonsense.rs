@@ -1,0 +1,118 @@
+//! No input makes the spectrum panic, and what it then says is finite.
+
+use rowtone::analyzer::Analyzer;
+use rowtone::camera::Timing;
+use rowtone::report::Report;
+use rowtone::spectrum::{Config, StaticStorage};
+use rowtone::timeline::{Group, Sample};
+
+struct Draw(u64);
+
+impl Draw {
+    fn next(&mut self) -> u64 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        self.0
+    }
+
+    fn of<T: Copy>(&mut self, choices: &[T]) -> T {
+        choices[self.next() as usize % choices.len()]
+    }
+}
+
+fn is_sane(report: &Report) -> bool {
+    report.noise_px.is_finite()
+        && report.fps.is_finite()
+        && report.window_s.is_finite()
+        && report.peaks.iter().all(|p| {
+            p.hz.is_finite()
+                && p.hz > 0.0
+                && p.hz_sd.is_finite()
+                && p.amplitude_px.is_finite()
+                && p.amplitude_px_sd.is_finite()
+                && p.snr_db.is_finite()
+        })
+}
+
+#[test]
+fn nothing_panics_and_all_is_finite() {
+    let odd = [
+        f32::NAN,
+        f32::INFINITY,
+        -1.0,
+        0.0,
+        1e-30,
+        1e30,
+        f32::MAX,
+        1.0,
+        0.5,
+        1e5,
+    ];
+    let jumps = [
+        0,
+        1,
+        -1,
+        1_000,
+        -1_000_000,
+        16_000_000,
+        900_000_000,
+        -3_000_000_000,
+        i64::MAX / 3,
+        i64::MIN / 3,
+    ];
+    for seed in 1..40_u64 {
+        let mut draw = Draw(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15));
+        let line_ps = draw.of(&[0, 1, 1_000_000, 50_000_000, u32::MAX]);
+        let rows = draw.of(&[1, 2, 40, 300]);
+        let timing = Timing::new(line_ps, draw.of(&[0, 500_000, u32::MAX]), rows).unwrap();
+        let group = Group::new(timing, draw.of(&[1, 1.max(rows / 20)]).max(rows / 40)).unwrap();
+        let mut memory = Box::new(StaticStorage::<512, 24, 48, 256, 5>::new());
+        let config = Config {
+            window_ns: draw.of(&[1_000_000, 100_000_000, 1_000_000_000]),
+            hop_ns: draw.of(&[1_000_000, 500_000_000]),
+            max_passes: 60,
+            ..Config::default()
+        };
+        let mut analyzer = Analyzer::new(config, group, memory.lend()).unwrap();
+        let (mut frame, mut start_ns) = (draw.next() as u32, draw.of(&[0, -5, i64::MAX / 2]));
+        // Half of the seeds are mostly sane, with odd things strewn in.
+        let sane = seed % 2 == 0;
+        for _ in 0..120 {
+            let often = if sane { draw.next() % 16 == 0 } else { true };
+            start_ns = start_ns.saturating_add(if often { draw.of(&jumps) } else { 16_000_000 });
+            frame = frame.wrapping_add(if often {
+                draw.of(&[0, 1, 2, u32::MAX, 77_777])
+            } else {
+                1
+            });
+            for slot in 0..group.slots() {
+                let strange = if sane {
+                    draw.next() % 64 == 0
+                } else {
+                    draw.next() % 2 == 0
+                };
+                let unit = (draw.next() >> 40) as f32 / (1 << 24) as f32;
+                let sample = Sample {
+                    frame,
+                    slot: if strange {
+                        draw.of(&[slot, slot + 1, u16::MAX])
+                    } else {
+                        slot
+                    },
+                    time_ns: start_ns.saturating_add(group.middle_ns(slot)),
+                    shift_px: if strange { draw.of(&odd) } else { unit },
+                    information_per_px2: if strange { draw.of(&odd) } else { 1e4 },
+                };
+                if analyzer.push(sample) && draw.next() % 4 != 0 {
+                    let report = analyzer.report().expect("a window was ready");
+                    assert!(is_sane(&report), "{report:?}");
+                }
+            }
+        }
+        if let Some(report) = analyzer.finish() {
+            assert!(is_sane(&report), "{report:?}");
+        }
+        assert_eq!(analyzer.finish(), None);
+    }
+}
