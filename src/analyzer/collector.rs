@@ -121,7 +121,10 @@ impl<'a> Collector<'a> {
         let period = self.period_ns().unwrap_or(self.group.timing().readout_ns());
         let end = newest.start_ns.saturating_add(period.max(1));
         let fresh = match self.done_ns {
-            Some(done) => end.saturating_sub(done).saturating_mul(5) >= self.hop_ns.min(self.window_ns).saturating_mul(2),
+            Some(done) => {
+                end.saturating_sub(done).saturating_mul(5)
+                    >= self.hop_ns.min(self.window_ns).saturating_mul(2)
+            }
             None => true,
         };
         let done = fresh && self.complete(end);
