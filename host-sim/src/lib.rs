@@ -6,7 +6,7 @@
 //!
 //! - [`sim`]: a simulated rolling-shutter camera, with the truth about what it saw;
 //! - [`input`]: videos and the camera options;
-//! - [`tracking`]: frames to displacements;
+//! - [`tracking`]: frames to displacements, on a thread of its own ([`ring`] is between threads);
 //! - [`analysis`]: displacements to reports, in the memory that [`memory`] lends;
 //! - [`output`]: reports, displacements and pictures; [`serial`]: serial ports;
 //! - [`calibrate`]: what a flashing light tells about a camera; [`linear`]: small linear algebra;
@@ -22,6 +22,7 @@ pub mod input;
 pub mod linear;
 pub mod memory;
 pub mod output;
+pub mod ring;
 pub mod serial;
 pub mod sim;
 pub mod spectrum_scenes;

@@ -6,29 +6,33 @@
 
 use std::fs::File;
 use std::io::{self, Read};
-use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 
 use super::clock::Clock;
 use super::y4m::{Next, Reader};
 use super::{Camera, CameraArgs, Frame, Turn};
 use crate::failure::Failure;
+use crate::ring::{Inlet, Next as Arrival, Outlet, ring};
 
-/// Frames read ahead. Few, so that they stay in the cache between reading and measuring.
-const RING: usize = 4;
+/// Blocks of frames read ahead. Few, so that they stay in the cache between reading and measuring.
+const BLOCKS: usize = 3;
+/// Size of a block, bytes. Whoever reads a pipe may be waiting for each frame and gets it at once.
+const BLOCK_BYTES: usize = 1 << 20;
 
-/// What the reading thread has to say.
-enum Message {
-    Frame(Frame),
-    /// The file ended inside a frame; the frames before it are good.
+/// How the reading ended.
+#[derive(Debug)]
+enum Ending {
+    /// At the end of the file.
+    End,
+    /// Inside a frame; the frames before it are good.
     Truncated(String),
+    /// It could not go on.
     Failed(Failure),
 }
 
 /// The frames of a recording, in order.
 #[derive(Debug)]
 pub struct Feed {
-    messages: Receiver<Message>,
-    recycled: SyncSender<Frame>,
+    inlet: Inlet<Frame, Ending>,
     /// The camera that recorded them.
     pub camera: Camera,
     /// What to call the recording in messages.
@@ -80,11 +84,11 @@ impl Feed {
         let camera = args.camera(reader.header(), clock.fps())?;
         let frames = bytes
             .map(|all| all.saturating_sub(reader.header_bytes() as u64) / reader.stride() as u64);
-        let (to_us, messages) = sync_channel(RING);
-        let (recycled, used) = sync_channel(RING);
-        for _ in 0..RING {
-            let _ = recycled.try_send(Frame::default());
-        }
+        let block = match frames {
+            Some(_) => BLOCK_BYTES / reader.stride(),
+            None => 1,
+        };
+        let (outlet, inlet) = ring(BLOCKS, block.clamp(1, 64));
         let pts = args.pts.as_ref().map(|p| p.display().to_string());
         let thread = Reading {
             reader,
@@ -94,10 +98,9 @@ impl Feed {
             pts: pts.unwrap_or_default(),
             frames,
         };
-        std::thread::spawn(move || thread.run(&to_us, &used));
+        std::thread::spawn(move || thread.run(outlet));
         Ok(Self {
-            messages,
-            recycled,
+            inlet,
             camera,
             name,
             frames,
@@ -112,8 +115,8 @@ impl Feed {
     /// [`Failure::Input`] when the input turns out to be unusable at this point: the frames before it
     /// were good. A recording without any frame is unusable.
     pub fn next_frame(&mut self) -> Result<Option<Frame>, Failure> {
-        match self.messages.recv() {
-            Ok(Message::Frame(frame)) => {
+        match self.inlet.receive() {
+            Arrival::Item(frame) => {
                 self.delivered += 1;
                 if self.delivered == 2
                     && let Some(doubt) = self.camera.doubt.take()
@@ -122,29 +125,23 @@ impl Feed {
                 }
                 Ok(Some(frame))
             }
-            Ok(Message::Failed(failure)) => Err(failure),
-            Ok(Message::Truncated(text)) if self.delivered > 0 => {
+            Arrival::End(Ending::Failed(failure)) => Err(failure),
+            Arrival::End(Ending::Truncated(text)) if self.delivered > 0 => {
                 self.warning = Some(text);
                 Ok(None)
             }
-            Ok(Message::Truncated(text)) => Err(Failure::input(text)),
-            Err(_) if self.delivered > 0 => Ok(None),
-            Err(_) => Err(Failure::input(format!(
+            Arrival::End(Ending::Truncated(text)) => Err(Failure::input(text)),
+            Arrival::End(Ending::End) | Arrival::Gone if self.delivered > 0 => Ok(None),
+            Arrival::End(Ending::End) | Arrival::Gone => Err(Failure::input(format!(
                 "{}: there is no frame in it",
                 self.name
             ))),
         }
     }
 
-    /// Gives a frame's buffers back.
-    pub fn recycle(&self, frame: Frame) {
-        // A full ring means that kept frames came back late: let the surplus go.
-        let _ = self.recycled.try_send(frame);
-    }
-
-    /// Puts an empty buffer into the ring in place of a frame that is kept.
-    pub fn replace(&self) {
-        self.recycle(Frame::default());
+    /// Gives a frame's buffers back. A frame that is kept is replaced by a new one.
+    pub fn recycle(&mut self, frame: Frame) {
+        self.inlet.recycle(frame);
     }
 
     /// Something to tell the user after the last frame.
@@ -165,23 +162,21 @@ struct Reading<R> {
 
 impl<R: Read> Reading<R> {
     /// Reads until the end, or until nobody listens any more.
-    fn run(mut self, to: &SyncSender<Message>, used: &Receiver<Frame>) {
+    fn run(mut self, mut to: Outlet<Frame, Ending>) {
         for index in 0.. {
-            let Ok(mut frame) = used.recv() else {
+            let Some(mut frame) = to.spare() else {
                 return;
             };
-            let message = match self.read(index, &mut frame) {
-                Ok(Next::Frame { .. }) => Message::Frame(frame),
-                Ok(Next::End) => return,
+            let ending = match self.read(index, &mut frame) {
+                Ok(Next::Frame { .. }) if to.put(frame) => continue,
+                Ok(Next::Frame { .. }) => return,
+                Ok(Next::End) => Ending::End,
                 Ok(Next::Truncated { have, need }) => {
-                    Message::Truncated(self.truncated(index, have, need))
+                    Ending::Truncated(self.truncated(index, have, need))
                 }
-                Err(failure) => Message::Failed(failure),
+                Err(failure) => Ending::Failed(failure),
             };
-            let last = !matches!(message, Message::Frame(_));
-            if to.send(message).is_err() || last {
-                return;
-            }
+            return to.end(ending);
         }
     }
 

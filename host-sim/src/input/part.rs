@@ -140,6 +140,15 @@ impl Turn {
         }
     }
 
+    /// What undoes it.
+    pub const fn back(self) -> Self {
+        match self {
+            Self::Quarter => Self::ThreeQuarters,
+            Self::ThreeQuarters => Self::Quarter,
+            same => same,
+        }
+    }
+
     /// Width and height after turning.
     pub const fn size(self, width: usize, height: usize) -> (usize, usize) {
         match self {
@@ -242,7 +251,8 @@ mod tests {
             let mut to = Vec::new();
             turn.plane(&plane, 3, 2, &mut to);
             assert_eq!(to.iter().collect::<String>(), turned);
-            let (width, _) = turn.size(3, 2);
+            let (width, height) = turn.size(3, 2);
+            assert_eq!(turn.back().part(turn.part(part, 3, 2), width, height), part);
             let Rect {
                 x,
                 y,

@@ -10,8 +10,6 @@ mod background;
 mod engine;
 mod region;
 
-use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
-
 use rowtone::timeline::Displacement;
 
 pub use background::subtract;
@@ -20,6 +18,7 @@ use region::Region;
 
 use crate::failure::Failure;
 use crate::input::{Camera, Feed, Frame, Rect};
+use crate::ring::{Inlet, Next, Outlet, ring};
 
 /// Frames that the reference is learned from.
 const LEARN_FRAMES: usize = 30;
@@ -27,8 +26,10 @@ const LEARN_FRAMES: usize = 30;
 const ROUGH_FRAMES: usize = 10;
 /// Fewer where they are so large that keeping them would take more than this, bytes of luma.
 const LEARN_BYTES: usize = 512 << 20;
-/// Frames of displacements on their way: the lines go on while a report is computed.
-const QUEUE: usize = 32;
+/// Blocks of displacements on their way: the lines go on while a report is computed.
+const BLOCKS: usize = 4;
+/// Frames of a block, where nobody waits for each.
+const BLOCK_FRAMES: usize = 8;
 
 /// What the lines of one frame came to.
 #[derive(Debug, Default)]
@@ -42,23 +43,17 @@ pub struct FrameShifts {
     /// Rows that were not.
     pub unmeasured: Unmeasured,
     still: Vec<Displacement>,
+    /// Something to tell the user at once.
+    note: Option<String>,
 }
 
-enum Message {
-    Frame(FrameShifts),
-    Failed(Failure),
-    /// Something to tell the user at once.
-    Note(String),
-    Done {
-        warning: Option<String>,
-    },
-}
+/// How the lines ended, with the warning that the user is told in the end.
+type Ending = Result<Option<String>, Failure>;
 
 /// The displacements of a recording, frame by frame.
 #[derive(Debug)]
 pub struct Shifts {
-    messages: Receiver<Message>,
-    recycled: SyncSender<FrameShifts>,
+    inlet: Inlet<FrameShifts, Ending>,
     warning: Option<String>,
     /// The camera that recorded them.
     pub camera: Camera,
@@ -78,11 +73,12 @@ impl Shifts {
     pub fn start(feed: Feed) -> Result<Self, Failure> {
         let camera = feed.camera.clone();
         let part = camera.part_or_rest()?;
-        let (to_us, messages) = sync_channel(QUEUE);
-        let (recycled, used) = sync_channel(QUEUE);
-        for _ in 0..QUEUE {
-            let _ = recycled.try_send(FrameShifts::default());
-        }
+        let block = if feed.frames.is_some() {
+            BLOCK_FRAMES
+        } else {
+            1
+        };
+        let (outlet, inlet) = ring(BLOCKS * BLOCK_FRAMES / block, block);
         let (frames, name) = (feed.frames, feed.name.clone());
         // Made here and dropped at once: a part that cannot be measured is refused before anything
         // is read.
@@ -90,10 +86,9 @@ impl Shifts {
             let mut buffers = Buffers::new(&part);
             Engine::new(part, camera.timing, camera.bits, 1, &mut buffers, &name)?;
         }
-        std::thread::spawn(move || run(feed, part, &to_us, &used));
+        std::thread::spawn(move || run(feed, part, outlet));
         Ok(Self {
-            messages,
-            recycled,
+            inlet,
             warning: None,
             camera,
             part,
@@ -108,28 +103,27 @@ impl Shifts {
     /// [`Failure::Input`] when the input turns out to be unusable at this point; what came before was
     /// good.
     pub fn next_frame(&mut self) -> Result<Option<FrameShifts>, Failure> {
-        loop {
-            match self.messages.recv() {
-                Ok(Message::Frame(mut frame)) => {
-                    if self.camera.background.is_some() {
-                        background::subtract(&mut frame.rows, &frame.still);
-                    }
-                    return Ok(Some(frame));
+        match self.inlet.receive() {
+            Next::Item(mut frame) => {
+                if let Some(note) = frame.note.take() {
+                    eprintln!("rowtone: {}: {note}", self.name);
                 }
-                Ok(Message::Note(note)) => eprintln!("rowtone: {}: {note}", self.name),
-                Ok(Message::Failed(failure)) => return Err(failure),
-                Ok(Message::Done { warning }) => {
-                    self.warning = warning;
-                    return Ok(None);
+                if self.camera.background.is_some() {
+                    background::subtract(&mut frame.rows, &frame.still);
                 }
-                Err(_) => return Ok(None),
+                Ok(Some(frame))
             }
+            Next::End(ending) => {
+                self.warning = ending?;
+                Ok(None)
+            }
+            Next::Gone => Ok(None),
         }
     }
 
     /// Gives a frame's buffers back.
-    pub fn recycle(&self, frame: FrameShifts) {
-        let _ = self.recycled.try_send(frame);
+    pub fn recycle(&mut self, frame: FrameShifts) {
+        self.inlet.recycle(frame);
     }
 
     /// Something to tell the user after the last frame.
@@ -139,7 +133,7 @@ impl Shifts {
 }
 
 /// The line thread.
-fn run(mut feed: Feed, part: Rect, to: &SyncSender<Message>, used: &Receiver<FrameShifts>) {
+fn run(mut feed: Feed, part: Rect, mut to: Outlet<FrameShifts, Ending>) {
     let mut buffers = Buffers::new(&part);
     let mut still_buffers = feed.camera.background.as_ref().map(Buffers::new);
     let (kept, ending) = keep_first(&mut feed);
@@ -148,28 +142,27 @@ fn run(mut feed: Feed, part: Rect, to: &SyncSender<Message>, used: &Receiver<Fra
         true => region::choose(&kept, &part),
         false => whole.clone(),
     };
-    if region != whole {
-        let _ = to.send(Message::Note(told(&region)));
-    }
-    let outcome = Lines::new(feed, part, &region, &mut buffers, still_buffers.as_mut())
-        .and_then(|mut lines| lines.run(kept, ending, to, used));
-    let message = match outcome {
-        Ok(warning) => Message::Done { warning },
-        Err(failure) => Message::Failed(failure),
-    };
-    // Nobody listens any more: then nobody needs to know.
-    let _ = to.send(message);
+    let note = (region != whole).then(|| told(&region, &feed.camera));
+    let ending = Lines::new(feed, part, &region, &mut buffers, still_buffers.as_mut())
+        .and_then(|mut lines| lines.run(kept, ending, note, &mut to));
+    to.end(ending);
 }
 
 /// What `--roi auto` chose.
-fn told(region: &Region) -> String {
+fn told(region: &Region, camera: &Camera) -> String {
     let Region { columns, rows } = region;
+    let part = Rect {
+        x: columns.start,
+        y: rows.start,
+        width: columns.len(),
+        height: rows.len(),
+    };
+    // As the user gives it: in the picture as it was.
+    let (width, height) = camera.size;
+    let part = camera.turn.back().part(part, width, height);
     format!(
         "--roi auto measures {},{},{},{}: the rest stands still (--roi full for all of it)",
-        columns.start,
-        rows.start,
-        columns.len(),
-        rows.len()
+        part.x, part.y, part.width, part.height
     )
 }
 
@@ -180,10 +173,7 @@ fn keep_first(feed: &mut Feed) -> (Vec<Frame>, Result<bool, Failure>) {
     let mut kept = Vec::new();
     while kept.len() < most {
         match feed.next_frame() {
-            Ok(Some(frame)) => {
-                kept.push(frame);
-                feed.replace();
-            }
+            Ok(Some(frame)) => kept.push(frame),
             Ok(None) => return (kept, Ok(false)),
             Err(failure) => return (kept, Err(failure)),
         }
@@ -234,9 +224,9 @@ impl<'a> Lines<'a> {
         &mut self,
         kept: Vec<Frame>,
         mut ending: Result<bool, Failure>,
-        to: &SyncSender<Message>,
-        used: &Receiver<FrameShifts>,
-    ) -> Result<Option<String>, Failure> {
+        mut note: Option<String>,
+        to: &mut Outlet<FrameShifts, Ending>,
+    ) -> Ending {
         if kept.len() < 2 {
             ending?;
             return Err(Failure::input(format!(
@@ -258,14 +248,14 @@ impl<'a> Lines<'a> {
             }
         }
         for frame in kept {
-            if !self.measure(frame, to, used) {
+            if !self.measure(frame, note.take(), to) {
                 return Ok(None);
             }
         }
         while let Ok(true) = ending {
             match self.feed.next_frame() {
                 Ok(Some(frame)) => {
-                    if !self.measure(frame, to, used) {
+                    if !self.measure(frame, None, to) {
                         return Ok(None);
                     }
                 }
@@ -280,14 +270,15 @@ impl<'a> Lines<'a> {
     fn measure(
         &mut self,
         frame: Frame,
-        to: &SyncSender<Message>,
-        used: &Receiver<FrameShifts>,
+        note: Option<String>,
+        to: &mut Outlet<FrameShifts, Ending>,
     ) -> bool {
-        let Ok(mut shifts) = used.recv() else {
+        let Some(mut shifts) = to.spare() else {
             return false;
         };
         shifts.number = frame.number;
         shifts.start_ns = frame.start_ns;
+        shifts.note = note;
         shifts.rows.clear();
         shifts.still.clear();
         shifts.unmeasured = self.moving.measure(&frame, &mut shifts.rows);
@@ -295,6 +286,6 @@ impl<'a> Lines<'a> {
             still.measure(&frame, &mut shifts.still);
         }
         self.feed.recycle(frame);
-        to.send(Message::Frame(shifts)).is_ok()
+        to.put(shifts)
     }
 }
