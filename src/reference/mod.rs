@@ -49,11 +49,11 @@ impl RowTable {
         self.pixel_sum
     }
 
-    /// The shift for `product` = Σ h·p of a line whose brightness is `gain` times the reference's, px;
+    /// The shift for `product` = Σ h·p/g of a line whose brightness is g times the reference's, px;
     /// right within ± 0.7 px or so.
     #[inline]
-    pub fn shift_px(&self, product: f32, gain: f32) -> f32 {
-        let u = product * self.px_per_product / gain - self.offset_px;
+    pub fn shift_px(&self, product: f32) -> f32 {
+        let u = product * self.px_per_product - self.offset_px;
         let quadratic = f32::from(self.quadratic) * (1.0 / 256.0);
         let cubic = f32::from(self.cubic) * (1.0 / 64.0);
         u * (1.0 + u * (quadratic + u * cubic))

@@ -62,7 +62,7 @@ impl Tracker<'_> {
         self.frame = None;
         self.frames_in_stage = 0;
         self.range_px = 0.0;
-        self.gain = 1.0;
+        self.to_reference = 1.0;
         self.prediction = Prediction::default();
         self.meter = NoiseMeter::default();
         self.watch = Watch::default();
@@ -174,8 +174,13 @@ impl Tracker<'_> {
         };
         learning.frames = learning.frames.saturating_add(1).min(memory);
         let keep = 1.0 / f32::from(learning.frames);
-        let gain = if self.gain > 0.1 { self.gain } else { 1.0 };
-        align::average_in(mean, pixels, shift_px, keep / gain, keep, &self.recipe);
+        // A line ten times darker than its reference is no measure of brightness.
+        let bright = if self.to_reference < 10.0 {
+            self.to_reference
+        } else {
+            1.0
+        };
+        align::average_in(mean, pixels, shift_px, keep * bright, keep, &self.recipe);
     }
 
     fn measure_noise<P: Pixel>(&mut self, row: usize, pixels: &[P], shift_px: f32, frames: u16) {
@@ -185,8 +190,14 @@ impl Tracker<'_> {
         };
         if frames >= 2 || self.stage == Stage::Rough && frames >= 1 {
             let frames = f32::from(frames);
-            self.meter
-                .add_line(mean, pixels, shift_px, self.gain, &self.recipe, frames);
+            self.meter.add_line(
+                mean,
+                pixels,
+                shift_px,
+                1.0 / self.to_reference,
+                &self.recipe,
+                frames,
+            );
         }
     }
 

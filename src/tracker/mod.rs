@@ -70,8 +70,8 @@ pub struct Tracker<'a> {
     frame: Option<u32>,
     frames_in_stage: u16,
     prediction: Prediction,
-    /// Brightness of the last line against its reference.
-    gain: f32,
+    /// The factor that brings the last line to its reference's brightness.
+    to_reference: f32,
     meter: NoiseMeter,
     /// Largest shift met in this round, px.
     range_px: f32,
@@ -124,7 +124,7 @@ impl<'a> Tracker<'a> {
             frame: None,
             frames_in_stage: 0,
             prediction: Prediction::default(),
-            gain: 1.0,
+            to_reference: 1.0,
             meter: NoiseMeter::default(),
             range_px: 0.0,
             watch: Watch::default(),
@@ -241,7 +241,7 @@ impl<'a> Tracker<'a> {
             return Found::NoTexture;
         }
         let expected = self.prediction.shift_px();
-        let before = self.gain;
+        let before = self.to_reference;
         let Some(mut shift_px) = self.correlate(row, &table, pixels, expected) else {
             return Found::NoTexture;
         };
@@ -250,7 +250,7 @@ impl<'a> Tracker<'a> {
         let due = turn
             || self.watch.is_due(row)
             || surprise * surprise * information_per_px2 > 49.0 + information_per_px2
-            || (self.gain - before).abs() > 0.05 * before.abs();
+            || (self.to_reference - before).abs() > 0.05 * before;
         if due {
             match self.look(row, &table, pixels, shift_px) {
                 Some(looked) => shift_px = looked,
@@ -303,8 +303,8 @@ impl<'a> Tracker<'a> {
                 .sum();
             let seen = table.pixel_sum() - unseen as f32 / self.recipe.counts_per_value;
             // A black line has no brightness to divide by, and no texture to measure.
-            self.gain = (sums.pixels as f32 / seen.max(1.0)).max(1e-3);
-            let near = table.shift_px(sums.product as f32, self.gain);
+            self.to_reference = seen.max(1.0) / (sums.pixels as f32).max(1.0);
+            let near = table.shift_px(sums.product as f32 * self.to_reference);
             shift_px = whole as f32 + near;
             let next = (whole + steps(near.clamp(-4.0, 4.0))).clamp(-limit, limit);
             if near.abs() <= NEAR_PX * stride as f32 || next == whole {

@@ -99,8 +99,8 @@ impl Tracker<'_> {
         if fit.is_some() {
             self.watch.fitted += 1;
         } else {
-            // The gain is that of something else.
-            self.gain = 1.0;
+            // The brightness is that of something else.
+            self.to_reference = 1.0;
             self.watch.unfit += 1;
         }
         fit
@@ -140,6 +140,7 @@ impl Tracker<'_> {
         let line = pixels.get(overlap.line)?;
         let (value, pitch) = (1.0 / r.counts_per_value, 1.0 / r.stride as f32);
         let own = 1.0 + 1.0 / frames;
+        let gain = 1.0 / self.to_reference;
         let (mut power, mut slopes, mut n) = (0.0f32, 0.0f32, 0.0f32);
         // What the motion carries in and out at the ends is little known.
         let inner = mean.len().checked_sub(2 * r.margin_px + 2 * r.stride)?;
@@ -164,7 +165,7 @@ impl Tracker<'_> {
             let slope = 0.5 * (right - left) * pitch;
             let bend = (right - 2.0 * here + left) * pitch * pitch;
             let model = here - near * (slope - 0.5 * near * bend);
-            let rest = f32::from(p.value()) - self.gain * model;
+            let rest = f32::from(p.value()) - gain * model;
             let weight = 1.0 / (r.noise.variance(here) * own);
             power += rest * rest * weight;
             slopes += slope * slope * weight;
