@@ -11,6 +11,7 @@
 
 mod config;
 mod counts;
+mod flicker;
 mod follow;
 mod learn;
 mod overlap;
@@ -23,12 +24,13 @@ pub use learn::{ColumnLearning, RowLearning};
 
 use crate::{
     band::Level,
-    camera::{Line, Pixels},
+    camera::{Line, Pixels, Timing},
     noise::{NoiseMeter, PixelNoise},
     pixel::Pixel,
     reference::{Recipe, RowTable},
     timeline::Displacement,
 };
+use flicker::Flicker;
 use follow::Follow;
 use overlap::Overlap;
 use predict::Prediction;
@@ -72,6 +74,10 @@ pub struct Tracker<'a> {
     prediction: Prediction,
     /// The factor that brings the last line to its reference's brightness.
     to_reference: f32,
+    flicker: Flicker,
+    /// T²/(12·line time): what a relative change of the light from row to row delays the exposure's mean
+    /// time by, ns. 0 with a global shutter.
+    ns_per_slope: f32,
     meter: NoiseMeter,
     /// Largest shift met in this round, px.
     range_px: f32,
@@ -125,6 +131,8 @@ impl<'a> Tracker<'a> {
             frames_in_stage: 0,
             prediction: Prediction::default(),
             to_reference: 1.0,
+            flicker: Flicker::default(),
+            ns_per_slope: ns_per_slope(&config.timing),
             meter: NoiseMeter::default(),
             range_px: 0.0,
             watch: Watch::default(),
@@ -206,7 +214,8 @@ impl<'a> Tracker<'a> {
                 row: line.row,
                 time_ns: line
                     .start_ns
-                    .saturating_add(i64::from(self.config.timing.exposure_ns() / 2)),
+                    .saturating_add(i64::from(self.config.timing.exposure_ns() / 2))
+                    .saturating_add(self.flicker.delay_ns(self.ns_per_slope)),
                 shift_px: shift_px + self.follow.anchor_px(),
                 information_per_px2,
             }),
@@ -228,6 +237,7 @@ impl<'a> Tracker<'a> {
         self.frame = Some(frame);
         self.turn = self.turn_of(frame);
         self.watch.begin_frame(frame);
+        self.flicker.begin_frame();
     }
 
     /// Shift of a line against its reference, in the reference's own coordinates.
@@ -265,6 +275,7 @@ impl<'a> Tracker<'a> {
         } else {
             self.prediction.add(shift_px, information_per_px2);
         }
+        self.flicker.add(self.to_reference);
         Found::At {
             shift_px,
             information_per_px2,
@@ -314,6 +325,15 @@ impl<'a> Tracker<'a> {
         }
         shift_px.is_finite().then_some(shift_px)
     }
+}
+
+/// See [`flicker`].
+fn ns_per_slope(timing: &Timing) -> f32 {
+    if timing.is_global_shutter() {
+        return 0.0;
+    }
+    let exposure_ns = timing.exposure_ns() as f32;
+    exposure_ns * exposure_ns / (12.0 * timing.line_time_ps() as f32 / 1000.0)
 }
 
 /// The nearest whole number, as fast as a cast. Saturates; 0 for NaN.
