@@ -89,6 +89,7 @@ pub fn spectrum_config(settings: &Settings) -> spectrum::Config {
         max_peaks: settings.max_peaks.into(),
         false_alarm: settings.false_alarm,
         um_per_px: settings.um_per_px,
+        ..spectrum::Config::default()
     }
 }
 
