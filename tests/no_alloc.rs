@@ -1,0 +1,290 @@
+//! The core never allocates: a counting global allocator watches the whole chain, from lines to bytes and
+//! from bytes to settings, in buffers that were lent once.
+//!
+//! One test function only: the count is of one thread, but a second test would share the program.
+#![allow(unsafe_code)]
+
+mod wire_common;
+
+use rowtone::analyzer::{Analyzer, Collector, Reporter};
+use rowtone::camera::{Line, Pixels, Timing};
+use rowtone::kernel::Kernel;
+use rowtone::link::Link;
+use rowtone::outbox::Outbox;
+use rowtone::reference::RowTable;
+use rowtone::report::Report;
+use rowtone::settings::store::{Nowhere, Started};
+use rowtone::settings::{Board, Console, Limits, Settings, Wire};
+use rowtone::spectrum::{self, StaticStorage};
+use rowtone::timeline::{Binner, Group};
+use rowtone::tracker::{ColumnLearning, Config, Outcome, RowLearning, Storage, Tracker};
+use rowtone::wire::{Message, SettingsOrigin, binary, text};
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+use std::f32::consts::TAU;
+use wire_common::ordinary_report;
+
+thread_local! {
+    /// Calls of the allocator on this thread: the test program's other threads do not count.
+    static CALLS: Cell<u64> = const { Cell::new(0) };
+}
+
+struct Counting;
+
+fn count() {
+    // While a thread ends there is nothing left to count in.
+    let _ = CALLS.try_with(|calls| calls.set(calls.get() + 1));
+}
+
+// SAFETY: every call is handed on to the system's allocator as it is.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        count();
+        // SAFETY: the caller's promises are handed on.
+        unsafe { System.alloc(layout) }
+    }
+    unsafe fn dealloc(&self, memory: *mut u8, layout: Layout) {
+        count();
+        // SAFETY: the caller's promises are handed on.
+        unsafe { System.dealloc(memory, layout) }
+    }
+    unsafe fn realloc(&self, memory: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        count();
+        // SAFETY: the caller's promises are handed on.
+        unsafe { System.realloc(memory, layout, size) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+/// Calls of the allocator, and what `work` gives.
+fn calls_of<T>(work: impl FnOnce() -> T) -> (u64, T) {
+    let before = CALLS.get();
+    let result = work();
+    (CALLS.get() - before, result)
+}
+
+const WIDTH: usize = 64;
+const ROWS: usize = 16;
+const FRAMES: u32 = 330;
+const FPS: i64 = 50;
+
+/// A picture of waves, moved by `shift_px`; another scene has other waves.
+fn paint(line: &mut [u8; WIDTH], row: usize, shift_px: f32, scene: u32) {
+    let (a, b) = match scene {
+        0 => (0.061, 0.107),
+        _ => (0.083, 0.043),
+    };
+    for (x, p) in line.iter_mut().enumerate() {
+        let x = x as f32 - shift_px + 1.7 * row as f32;
+        *p = (120.0 + 60.0 * (TAU * a * x).sin() + 30.0 * (TAU * b * x + 1.0).cos()) as u8;
+    }
+}
+
+/// The camera's side: a vibration, a jump to be searched for, a hand, and at last another scene, which
+/// is learned anew.
+fn line_of(frame: u32, row: usize, line: &mut [u8; WIDTH]) -> i64 {
+    let start_ns = i64::from(frame) * (1_000_000_000 / FPS) + row as i64 * 1_000_000;
+    let tone = 0.3 * (TAU * 23.0 * start_ns as f32 * 1e-9).sin();
+    let jump = if (60..90).contains(&frame) { 7.0 } else { 0.0 };
+    let scene = u32::from(frame >= 200);
+    paint(line, row, tone + jump, scene);
+    if (100..104).contains(&frame) {
+        line.fill(200);
+    }
+    start_ns
+}
+
+#[test]
+fn nothing_is_allocated_from_lines_to_bytes() {
+    // What the allocator counts at all.
+    assert!(calls_of(|| drop(vec![1u8; 10])).0 >= 2);
+
+    let mut coefficients = [0i8; WIDTH * ROWS];
+    let mut tables = [RowTable::default(); ROWS];
+    let mut mean = [0u16; WIDTH * ROWS];
+    let mut learning = [RowLearning::default(); ROWS];
+    let mut mask = [255u8; WIDTH];
+    let mut columns = [ColumnLearning::default(); WIDTH];
+    let mut scratch = [0.0f32; 2 * WIDTH];
+    let mut spectrum = StaticStorage::<2048, 64, 16, 1024, 5>::new();
+    let mut halves = StaticStorage::<2048, 64, 16, 1024, 5>::new();
+    let mut slots = [const { None::<Report> }; 4];
+    let mut pixels = [0u8; WIDTH];
+    let mut deep = [0u16; WIDTH];
+    let timing = Timing::new(1_000_000_000, 100_000, ROWS as u16).unwrap();
+
+    for kernel in Kernel::all() {
+        let (calls, (counts, reports, bytes)) = calls_of(|| {
+            let config = Config {
+                learn_frames: 10,
+                columns_per_line: 7,
+                kernel,
+                ..Config::new(timing, WIDTH as u16)
+            };
+            let storage = Storage {
+                coefficients: &mut coefficients,
+                tables: &mut tables,
+                mean: &mut mean,
+                learning: &mut learning,
+                mask: &mut mask,
+                columns: &mut columns,
+                scratch: &mut scratch,
+            };
+            let mut tracker = Tracker::new(config, storage).unwrap();
+            let group = Group::new(timing, 1).unwrap();
+            let mut binner = Binner::new(group);
+            let config = spectrum::Config::default();
+            let mut analyzer = Analyzer::new(config, group, spectrum.lend()).unwrap();
+            let storage = halves.lend();
+            let mut collector = Collector::new(&config, group, storage.collected).unwrap();
+            let mut reporter = Reporter::new(config, group, storage.estimator).unwrap();
+            let mut link = link(&mut slots, Wire::Text);
+            let (mut reports, mut bytes) = (0, 0);
+            for frame in 0..FRAMES {
+                for row in 0..ROWS {
+                    let start_ns = line_of(frame, row, &mut pixels);
+                    // Deep pixels once in a while: the other kernel.
+                    let pixels = if frame % 16 == 3 {
+                        deep.iter_mut()
+                            .zip(&pixels)
+                            .for_each(|(d, &p)| *d = p.into());
+                        Pixels::U16(&deep)
+                    } else {
+                        Pixels::U8(&pixels)
+                    };
+                    let line = Line {
+                        frame,
+                        row: row as u16,
+                        start_ns,
+                        pixels,
+                    };
+                    let Outcome::Measured(displacement) = tracker.push(&line) else {
+                        continue;
+                    };
+                    let Some(sample) = binner.push(displacement) else {
+                        continue;
+                    };
+                    if collector.push(sample) && collector.hand_over(&mut reporter) {
+                        let _ = reporter.report();
+                    }
+                    if analyzer.push(sample)
+                        && let Some(report) = analyzer.report()
+                    {
+                        reports += 1;
+                        bytes += there_and_back(&report);
+                        link.push(report);
+                        bytes += drain(&mut link);
+                    }
+                }
+            }
+            binner.finish().into_iter().for_each(|s| {
+                let _ = analyzer.push(s);
+            });
+            if let Some(report) = analyzer.finish() {
+                reports += 1;
+                bytes += there_and_back(&report);
+            }
+            (tracker.counts(), reports, bytes)
+        });
+        assert_eq!(calls, 0, "{kernel:?}");
+        // The chain did go through all of its states.
+        assert!(counts.learning > 0 && counts.measured > 1000, "{counts:?}");
+        assert!(counts.disturbed > 0, "{counts:?}");
+        assert!(counts.relearned >= 1, "{counts:?}");
+        assert!(reports >= 3 && bytes > 100, "{reports} {bytes}");
+    }
+
+    for wire in [Wire::Text, Wire::Binary, Wire::Modbus] {
+        let (calls, said) = calls_of(|| {
+            let mut link = link(&mut slots, wire);
+            link.announce(0);
+            let mut said = drain(&mut link);
+            for seq in 0..6 {
+                link.push(ordinary_report(seq));
+            }
+            for line in [
+                "get\n",
+                "set window 0.5 hop 0.25\n",
+                "set window nonsense\n",
+                "status\n",
+                "resend 3 5\n",
+                "save\n",
+                "defaults\n",
+                "help\n",
+            ] {
+                for &byte in line.as_bytes() {
+                    link.receive(byte, 1000, &mut Nowhere);
+                }
+                said += drain(&mut link);
+            }
+            // A Modbus master reads an input register: unit 1, function 4.
+            let request = [1, 4, 0, 0, 0, 1, 0x31, 0xca];
+            for byte in request {
+                link.receive(byte, 2000, &mut Nowhere);
+            }
+            said + drain(&mut link)
+        });
+        assert_eq!(calls, 0, "{wire:?}");
+        assert!(said > 0, "{wire:?} said nothing");
+    }
+}
+
+fn link(slots: &mut [Option<Report>], wire: Wire) -> Link<'_> {
+    let board = Board {
+        version: [0, 1, 0],
+        limits: Limits {
+            width: 320,
+            height: 240,
+            min_width: 16,
+            max_window_s: 10.0,
+        },
+        defaults: Settings {
+            wire,
+            unit: 1,
+            ..Settings::default()
+        },
+    };
+    let started = Started {
+        session: 1,
+        settings: None,
+        origin: SettingsOrigin::Defaults,
+    };
+    Link::new(
+        Console::new(board, started).unwrap(),
+        Outbox::new(slots),
+        115_200,
+    )
+}
+
+/// Sends all that the board has to say; the number of bytes.
+fn drain(link: &mut Link<'_>) -> usize {
+    let mut said = 0;
+    loop {
+        let bytes = link.poll(1_000_000, &mut Nowhere).len();
+        if bytes == 0 {
+            return said;
+        }
+        link.sent(bytes);
+        said += bytes;
+    }
+}
+
+/// A report as text and as binary, and decoded again; the number of bytes.
+fn there_and_back(report: &Report) -> usize {
+    let message = Message::Report {
+        session: 1,
+        report: report.clone(),
+    };
+    let mut line = [0; text::MAX_LINE];
+    let line = text::encode_to_slice(&message, &mut line).unwrap();
+    let mut decoder = text::Decoder::<{ text::MAX_LINE }>::new();
+    let heard = line.iter().filter_map(|&b| decoder.push(b)).count();
+    let mut frame = [0; binary::MAX_FRAME];
+    let frame = binary::encode_to_slice(&message, &mut frame).unwrap();
+    let mut decoder = binary::Decoder::<{ binary::MAX_FRAME }>::new();
+    let heard = heard + frame.iter().filter_map(|&b| decoder.push(b)).count();
+    assert_eq!(heard, 2);
+    line.len() + frame.len()
+}
