@@ -90,6 +90,7 @@ pub mod link;
 pub mod noise;
 pub mod outbox;
 mod pixel;
+pub mod raw;
 pub mod reference;
 pub mod report;
 pub mod settings;
