@@ -6,6 +6,8 @@
 //! |h| ≤ [`MAX_COEFFICIENT`], so that a pair of products u8 × i8 never leaves 16 bits.
 #![allow(unsafe_code)]
 
+#[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
+mod aarch64;
 #[cfg(all(target_arch = "arm", target_feature = "dsp"))]
 mod cortex_m;
 mod portable;
@@ -36,6 +38,12 @@ pub enum Kernel {
     /// x86-64 with AVX2: 32 pixels a step.
     #[cfg(target_arch = "x86_64")]
     Avx2,
+    /// 64-bit Arm: 16 pixels a step.
+    #[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
+    Neon,
+    /// 64-bit Arm with the dot-product instructions: 32 pixels a step.
+    #[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
+    NeonDot,
 }
 
 impl Kernel {
@@ -47,14 +55,30 @@ impl Kernel {
         }
         #[cfg(all(target_arch = "arm", target_feature = "dsp"))]
         return Self::CortexM;
-        #[cfg(not(all(target_arch = "arm", target_feature = "dsp")))]
+        #[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
+        return if aarch64::has_dot_product() {
+            Self::NeonDot
+        } else {
+            Self::Neon
+        };
+        #[cfg(not(any(
+            all(target_arch = "arm", target_feature = "dsp"),
+            all(target_arch = "aarch64", target_feature = "neon")
+        )))]
         Self::Portable
     }
 
     /// All kernels that this processor can run, [`Kernel::Portable`] first.
     pub fn all() -> impl Iterator<Item = Self> {
         let best = Self::detect();
-        core::iter::once(Self::Portable).chain((best != Self::Portable).then_some(best))
+        let slower = [
+            Self::Portable,
+            // Every processor with the dot product has the rest of NEON too.
+            #[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
+            Self::Neon,
+        ];
+        let better = (!slower.contains(&best)).then_some(best);
+        slower.into_iter().chain(better)
     }
 
     /// Sums over 8-bit pixels. The shorter length of the two counts. |h| ≤ [`MAX_COEFFICIENT`], or the
@@ -68,6 +92,12 @@ impl Kernel {
             // SAFETY: the variant is only made by `detect`, which asked the processor for AVX2.
             #[cfg(target_arch = "x86_64")]
             Self::Avx2 => unsafe { x86_64::sums_u8(pixels, coefficients) },
+            // SAFETY: the program was compiled for processors with NEON.
+            #[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
+            Self::Neon => unsafe { aarch64::sums_u8(pixels, coefficients) },
+            // SAFETY: the variant is only made by `detect`, which asked for the dot product.
+            #[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
+            Self::NeonDot => unsafe { aarch64::sums_u8_dot(pixels, coefficients) },
         }
     }
 
@@ -82,6 +112,9 @@ impl Kernel {
             // SAFETY: the variant is only made by `detect`, which asked the processor for AVX2.
             #[cfg(target_arch = "x86_64")]
             Self::Avx2 => unsafe { x86_64::sums_u16(pixels, coefficients) },
+            // SAFETY: the program was compiled for processors with NEON.
+            #[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
+            Self::Neon | Self::NeonDot => unsafe { aarch64::sums_u16(pixels, coefficients) },
         }
     }
 }
@@ -105,7 +138,7 @@ mod tests {
 
     #[test]
     fn all_kernels_give_the_same_bits() {
-        for n in (0..200).chain([255, 256, 257, 640, 1536, 4096, 8192]) {
+        for n in (0..200).chain([255, 256, 257, 640, 1536, 4096, 8192, 70_001]) {
             let h: Vec<i8> = bytes(n as u64, n)
                 .map(|b| (i16::from(b % 129) - 64) as i8)
                 .collect();
@@ -116,16 +149,23 @@ mod tests {
                 .map(|b| u16::from_le_bytes([b[0], b[1]]))
                 .collect();
             let (full, full_deep) = (std::vec![255u8; n], std::vec![65535u16; n]);
+            let (zero, zero_deep) = (std::vec![0u8; n], std::vec![0u16; n]);
             let signs: Vec<i8> = h.iter().map(|&h| if h < 0 { -64 } else { 64 }).collect();
+            let most = std::vec![-MAX_COEFFICIENT; n];
             for kernel in Kernel::all() {
-                for (p, h) in [(&p, &h), (&full, &signs)] {
+                for (p, h) in [(&p, &h), (&full, &signs), (&zero, &most), (&full, &most)] {
                     assert_eq!(
                         kernel.sums_u8(p, h),
                         portable::sums_u8(p, h),
                         "{kernel:?} {n}"
                     );
                 }
-                for (p, h) in [(&deep, &h), (&full_deep, &signs)] {
+                for (p, h) in [
+                    (&deep, &h),
+                    (&full_deep, &signs),
+                    (&zero_deep, &most),
+                    (&full_deep, &most),
+                ] {
                     let exact = Sums {
                         product: p
                             .iter()
