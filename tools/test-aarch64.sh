@@ -3,7 +3,7 @@
 # it, run under user-mode emulation, once on a processor with the dot-product instructions (Raspberry Pi 5)
 # and once without (3, 4, Zero 2). The kernels' test compares every one of them bit by bit with plain Rust.
 #
-#   tools/test-aarch64.sh [test filter]
+#   tools/test-aarch64.sh [test filters]
 #
 # Needs what tools/aarch64-cargo.sh needs, and Debian's qemu-user-static.
 set -euo pipefail
@@ -16,5 +16,5 @@ command -v qemu-aarch64-static >/dev/null || {
 for processor in max cortex-a53; do
     echo "== $processor"
     CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_RUNNER="qemu-aarch64-static -cpu $processor -L /usr/aarch64-linux-gnu" \
-        tools/aarch64-cargo.sh test -p rowtone --features std --lib --release "$@"
+        tools/aarch64-cargo.sh test -p rowtone --features std --lib --release -- "$@"
 done
