@@ -1,0 +1,171 @@
+//! A camera that is none: textured rows, each moved as the machine was at its own time.
+//!
+//! For `--simulate` and the tests. It is far simpler than host-sim's camera (no noise model, no exposure) and
+//! has what those lack: faults on demand.
+
+use std::f64::consts::TAU;
+use std::time::Duration;
+
+use rowtone::raw::RawFormat;
+
+use super::{CameraError, Facts, Frame, Shape, Source};
+
+/// A tone of the simulated machine.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tone {
+    /// Frequency, Hz.
+    pub hz: f64,
+    /// Zero to peak, px.
+    pub px: f64,
+}
+
+/// What to simulate.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scene {
+    /// Columns.
+    pub width: u16,
+    /// Rows.
+    pub height: u16,
+    /// From one row to the next, s.
+    pub line_time_s: f64,
+    /// From one frame to the next, ns.
+    pub frame_period_ns: i64,
+    /// Motion.
+    pub tones: Vec<Tone>,
+    /// Frames after which the camera is gone; never where there is none.
+    pub frames: Option<u32>,
+    /// Every so many frames one is lost; never where there is none.
+    pub lose_every: Option<u32>,
+    /// Every so many frames one is corrupt; never where there is none.
+    pub spoil_every: Option<u32>,
+    /// Wait for each frame's time, as a camera does.
+    pub paced: bool,
+}
+
+impl Default for Scene {
+    /// 320 x 240 at 60 frames/s, 97.3 Hz with 0.4 px and 211.7 Hz with 0.1 px.
+    fn default() -> Self {
+        Self {
+            width: 320,
+            height: 240,
+            line_time_s: 66e-6,
+            frame_period_ns: 16_666_667,
+            tones: vec![Tone { hz: 97.3, px: 0.4 }, Tone { hz: 211.7, px: 0.1 }],
+            frames: None,
+            lose_every: None,
+            spoil_every: None,
+            paced: true,
+        }
+    }
+}
+
+impl Scene {
+    /// Where the machine is, px.
+    pub fn shift_px(&self, time_s: f64) -> f64 {
+        let tones = self.tones.iter();
+        tones.map(|t| t.px * (TAU * t.hz * time_s).sin()).sum()
+    }
+
+    /// One frame, 8-bit, row by row.
+    pub fn draw(&self, start_ns: i64, seed: u32, to: &mut Vec<u8>) {
+        to.clear();
+        let mut noise = seed.wrapping_mul(2_654_435_761) | 1;
+        for y in 0..self.height {
+            let time_s = start_ns as f64 * 1e-9 + f64::from(y) * self.line_time_s;
+            let d = self.shift_px(time_s);
+            // Three waves whose phases differ from row to row: nothing a row could be confused with.
+            let row = f64::from(y);
+            for x in 0..self.width {
+                let u = f64::from(x) - d;
+                let light = 120.0
+                    + 45.0 * (TAU * u / 13.7 + 0.9 * row).sin()
+                    + 30.0 * (TAU * u / 29.3 - 0.31 * row).sin()
+                    + 20.0 * (TAU * u / 8.9 + 1.7 * row).cos();
+                noise = noise.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                let dither = f64::from(noise >> 8) / f64::from(1u32 << 24);
+                to.push((light + dither) as u8);
+            }
+        }
+    }
+}
+
+/// See the [module](self).
+#[derive(Debug)]
+pub struct Simulated {
+    scene: Scene,
+    facts: Facts,
+    sequence: u32,
+    start_ns: i64,
+    bytes: Vec<u8>,
+}
+
+impl Simulated {
+    /// A camera that starts at frame 0.
+    pub fn new(scene: Scene) -> Self {
+        let shape = Shape {
+            width: scene.width,
+            height: scene.height,
+            stride: usize::from(scene.width),
+            format: RawFormat::Raw8,
+            bayer: false,
+        };
+        Self {
+            facts: Facts {
+                id: "simulated".to_owned(),
+                shape,
+                line_time: Some((scene.line_time_s, "the simulation")),
+                frame_period_ns: Some(scene.frame_period_ns),
+                reasons: String::new(),
+            },
+            scene,
+            sequence: 0,
+            start_ns: 0,
+            bytes: Vec::new(),
+        }
+    }
+}
+
+impl Source for Simulated {
+    fn facts(&self) -> &Facts {
+        &self.facts
+    }
+
+    fn next(
+        &mut self,
+        _patience: Duration,
+        take: &mut dyn FnMut(Frame<'_>),
+    ) -> Result<(), CameraError> {
+        if self
+            .scene
+            .frames
+            .is_some_and(|frames| self.sequence >= frames)
+        {
+            return Err(CameraError::Gone);
+        }
+        if self.scene.paced {
+            std::thread::sleep(Duration::from_nanos(self.scene.frame_period_ns as u64));
+        }
+        let due = |every: Option<u32>, sequence: u32| {
+            every.is_some_and(|every| sequence % every == every - 1)
+        };
+        if due(self.scene.lose_every, self.sequence) {
+            self.sequence += 1;
+            self.start_ns += self.scene.frame_period_ns;
+        }
+        self.scene
+            .draw(self.start_ns, self.sequence, &mut self.bytes);
+        take(Frame {
+            sequence: self.sequence,
+            start_ns: Some(self.start_ns),
+            bytes: &self.bytes,
+            intact: !due(self.scene.spoil_every, self.sequence),
+        });
+        self.sequence += 1;
+        self.start_ns += self.scene.frame_period_ns;
+        Ok(())
+    }
+
+    fn set_frame_period(&mut self, period_ns: i64) {
+        self.scene.frame_period_ns = period_ns;
+    }
+}

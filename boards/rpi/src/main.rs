@@ -1,0 +1,232 @@
+//! The command `rowtone-rpi`; see the library for how it works.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use clap::{Parser, Subcommand};
+use rowtone_rpi::capture::simulated::{Scene, Simulated};
+use rowtone_rpi::capture::{CameraError, Source};
+use rowtone_rpi::config::{Config, ConfigError, Replay, StreamWish};
+use rowtone_rpi::doctor;
+use rowtone_rpi::run::{self, log};
+use rowtone_rpi::session::Shared;
+
+/// Where the configuration is unless told otherwise; it may be missing.
+const USUAL_CONFIG: &str = "/etc/rowtone/rowtone-rpi.toml";
+
+/// Measures vibration with a Raspberry Pi camera and reports peaks over UART.
+#[derive(Debug, Parser)]
+#[command(
+    version,
+    after_help = "Examples:\n  rowtone-rpi doctor\n  rowtone-rpi --output - --simulate\n  \
+    rowtone-rpi --config my.toml --mode auto"
+)]
+struct Cli {
+    /// Configuration file [default: /etc/rowtone/rowtone-rpi.toml, where there is one]
+    #[arg(long, value_name = "FILE", global = true)]
+    config: Option<PathBuf>,
+    /// Serial device, or - for standard output
+    #[arg(long, value_name = "PORT", global = true)]
+    output: Option<String>,
+    /// Part of the camera's name
+    #[arg(long, value_name = "NAME", global = true)]
+    camera: Option<String>,
+    /// Sensor mode: auto, or a size as 1332x990
+    #[arg(long, value_name = "MODE", global = true)]
+    mode: Option<String>,
+    /// Kind of pictures: raw rows of the sensor, or luma of the image processor
+    #[arg(long, value_name = "raw|luma", global = true)]
+    stream: Option<String>,
+    /// From one row to the next, us
+    #[arg(long, value_name = "T", global = true)]
+    line_time_us: Option<f64>,
+    /// For tests: each picture is shown so many times and counts once
+    #[arg(long, value_name = "N", global = true, requires = "frame_period_us")]
+    take_every: Option<u32>,
+    /// For tests: pictures are so far apart, whatever the camera's clock says
+    #[arg(long, value_name = "T", global = true)]
+    frame_period_us: Option<f64>,
+    /// A simulated machine instead of a camera (97.3 Hz with 0.4 px, 211.7 Hz with 0.1 px)
+    #[arg(long, global = true)]
+    simulate: bool,
+    #[command(subcommand)]
+    command: Option<Command>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Subcommand)]
+enum Command {
+    /// Measures until stopped (the default)
+    Run,
+    /// Checks camera, serial port, permissions, light, focus and line time, and says what to do
+    Doctor,
+    /// Lists cameras and their modes, and which one would be chosen
+    Cameras,
+}
+
+fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let config = match configure(&cli) {
+        Ok(config) => config,
+        Err(e) => {
+            log(&e);
+            return ExitCode::from(2);
+        }
+    };
+    match cli.command.unwrap_or(Command::Run) {
+        Command::Run => measure(&cli, &config),
+        Command::Doctor => {
+            let camera = opener(cli.simulate).and_then(|mut open| open(&config));
+            let found = doctor::examine(&config, camera);
+            print!("{}", found.text);
+            ExitCode::from(u8::from(found.bad))
+        }
+        Command::Cameras => list(&config),
+    }
+}
+
+/// The file, and what the command line says otherwise.
+fn configure(cli: &Cli) -> Result<Config, String> {
+    let text = |e: ConfigError| e.to_string();
+    let mut config = match &cli.config {
+        Some(path) => Config::load(path).map_err(text)?,
+        None if Path::new(USUAL_CONFIG).exists() => {
+            Config::load(Path::new(USUAL_CONFIG)).map_err(text)?
+        }
+        None => Config::defaults(),
+    };
+    if let Some(port) = &cli.output {
+        config.output.port.clone_from(port);
+    }
+    if cli.camera.is_some() {
+        config.camera.id.clone_from(&cli.camera);
+    }
+    if let Some(mode) = &cli.mode {
+        config.camera.mode = mode.parse().map_err(|e| format!("--{e}"))?;
+    }
+    if let Some(stream) = &cli.stream {
+        config.camera.stream = match stream.as_str() {
+            "raw" => StreamWish::Raw,
+            "luma" => StreamWish::Luma,
+            other => return Err(format!("--stream {other:?}: give raw or luma")),
+        };
+    }
+    let positive = |name: &str, us: f64| match us {
+        us if us > 0.0 && us < 1e8 => Ok(us),
+        us => Err(format!("--{name} {us}: give a time above 0")),
+    };
+    if let Some(us) = cli.line_time_us {
+        config.camera.line_time_s = Some(positive("line-time-us", us)? * 1e-6);
+    }
+    if let Some(us) = cli.frame_period_us {
+        config.camera.replay = Some(Replay {
+            take_every: cli.take_every.unwrap_or(1).max(1),
+            frame_period_ns: (positive("frame-period-us", us)? * 1000.0) as i64,
+        });
+    }
+    Ok(config)
+}
+
+fn measure(cli: &Cli, config: &Config) -> ExitCode {
+    let mut open = match opener(cli.simulate) {
+        Ok(open) => open,
+        Err(e) => {
+            log(&e.to_string());
+            return ExitCode::FAILURE;
+        }
+    };
+    let shared = Shared::new(config.settings);
+    let asked = Arc::new(AtomicBool::new(false));
+    for signal in [signal_hook::consts::SIGTERM, signal_hook::consts::SIGINT] {
+        if let Err(e) = signal_hook::flag::register(signal, asked.clone()) {
+            log(&format!("signal {signal} cannot be caught: {e}"));
+        }
+    }
+    let done = AtomicBool::new(false);
+    let outcome = std::thread::scope(|scope| {
+        let (shared, asked, done) = (&shared, &asked, &done);
+        scope.spawn(move || {
+            while !done.load(Ordering::Relaxed) {
+                if asked.load(Ordering::Relaxed) {
+                    shared.stop.store(true, Ordering::Relaxed);
+                }
+                std::thread::sleep(std::time::Duration::from_millis(20));
+            }
+        });
+        let outcome = run::run(config, shared, &mut open);
+        done.store(true, Ordering::Relaxed);
+        outcome
+    });
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(e) => {
+            log(&e.to_string());
+            ExitCode::from(2)
+        }
+    }
+}
+
+type Opener = Box<dyn FnMut(&Config) -> Result<Box<dyn Source>, CameraError>>;
+
+fn opener(simulate: bool) -> Result<Opener, CameraError> {
+    if simulate {
+        return Ok(Box::new(|_| {
+            Ok(Box::new(Simulated::new(Scene::default())) as Box<dyn Source>)
+        }));
+    }
+    camera()
+}
+
+#[cfg(feature = "libcamera")]
+fn camera() -> Result<Opener, CameraError> {
+    let mut cameras = rowtone_rpi::capture::libcamera::Cameras::new()?;
+    Ok(Box::new(move |config| cameras.open(config)))
+}
+
+#[cfg(not(feature = "libcamera"))]
+fn camera() -> Result<Opener, CameraError> {
+    Err(CameraError::Refused(
+        "this program was built without libcamera (--features libcamera); --simulate works"
+            .to_owned(),
+    ))
+}
+
+#[cfg(feature = "libcamera")]
+fn list(config: &Config) -> ExitCode {
+    use rowtone_rpi::capture::libcamera::Cameras;
+    use rowtone_rpi::mode::{Needs, choose};
+    let modes = Cameras::new().and_then(|cameras| {
+        for name in cameras.names() {
+            println!("{name}");
+        }
+        cameras.offers(config)
+    });
+    let offers = match modes {
+        Ok(offers) => offers,
+        Err(e) => {
+            log(&e.to_string());
+            return ExitCode::FAILURE;
+        }
+    };
+    let needs = Needs {
+        highest_hz: config.highest_hz().into(),
+        reach: (0, 0),
+    };
+    match choose(&offers, config.camera.mode, &needs) {
+        Ok(choice) => {
+            print!("{}", choice.reasons);
+            ExitCode::SUCCESS
+        }
+        Err(e) => {
+            log(&e.to_string());
+            ExitCode::FAILURE
+        }
+    }
+}
+
+#[cfg(not(feature = "libcamera"))]
+fn list(_: &Config) -> ExitCode {
+    log("this program was built without libcamera (--features libcamera)");
+    ExitCode::FAILURE
+}

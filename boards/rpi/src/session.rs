@@ -1,0 +1,255 @@
+//! Measuring from one opening of the camera to its end.
+//!
+//! The calling thread takes lines; a second one computes spectra. Between them stands one window: where the
+//! spectrum is still busy when the next window is complete, that window is dropped and counted. Reports go
+//! into a bounded queue; where that is full they are dropped and counted. The line path waits for neither.
+
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use rowtone::analyzer::{Collector, Reporter};
+use rowtone::report::{Report, Warnings};
+use rowtone::settings::Settings;
+
+use crate::capture::{CameraError, Source};
+use crate::clock::{FrameClock, FrameCounts};
+use crate::config::Config;
+use crate::lines::{Lines, LinesError};
+use crate::memory::{SpectrumMemory, TrackerMemory};
+use crate::notify::Notifier;
+use crate::setup::Setup;
+
+/// What all threads share.
+#[derive(Debug)]
+pub struct Shared {
+    /// The program is to end.
+    pub stop: AtomicBool,
+    /// Counts the changes of what is measured.
+    pub changes: AtomicU32,
+    /// What is measured now.
+    pub settings: Mutex<Settings>,
+    /// Windows dropped because the spectrum was busy, and reports because the queue was full.
+    pub dropped: AtomicU64,
+    /// When the program began.
+    pub started: Instant,
+}
+
+impl Shared {
+    /// Nothing stopped, changed or dropped.
+    pub fn new(settings: Settings) -> Self {
+        Self {
+            stop: AtomicBool::new(false),
+            changes: AtomicU32::new(0),
+            settings: Mutex::new(settings),
+            dropped: AtomicU64::new(0),
+            started: Instant::now(),
+        }
+    }
+
+    /// The settings in use.
+    pub fn settings(&self) -> Settings {
+        *self.settings.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The program is to end.
+    pub fn is_stopping(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
+    }
+}
+
+/// Why a session ended.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Ended {
+    /// The program is to end.
+    Asked,
+    /// Something else is to be measured.
+    Changed,
+    /// The camera failed.
+    Camera(CameraError),
+}
+
+/// A window handed over.
+struct Ready {
+    warnings: Warnings,
+    /// Time of the program at which the session began, ms.
+    offset_ms: u64,
+}
+
+/// Measures until the end.
+///
+/// # Errors
+/// [`LinesError`] where the core refuses the setup.
+pub fn run(
+    source: &mut dyn Source,
+    setup: &Setup,
+    config: &Config,
+    shared: &Shared,
+    reports: &SyncSender<Report>,
+    notifier: &Notifier,
+) -> Result<(Ended, FrameCounts), LinesError> {
+    let mut tracker_memory = TrackerMemory::new(setup.part.width, setup.part.height);
+    let mut spectrum_memory = SpectrumMemory::new(setup.group, setup.window_frames);
+    let storage = spectrum_memory.lend();
+    let reporter = Reporter::new(setup.spectrum, setup.group, storage.estimator);
+    let reporter = Mutex::new(reporter.map_err(LinesError::Spectrum)?);
+    let period_ns = source.facts().frame_period_ns;
+    let clock = FrameClock::new(config.camera.replay, period_ns);
+    let mut lines = Lines::new(setup, clock, tracker_memory.lend(), storage.collected)?;
+    let (ready, windows) = sync_channel(1);
+    let ended = std::thread::scope(|scope| {
+        let reporter = &reporter;
+        // Ends when `ready` is dropped.
+        let spectrum = std::thread::Builder::new().name("spectrum".to_owned());
+        let spawned = spectrum.spawn_scoped(scope, move || {
+            compute(&windows, reporter, reports, shared);
+        });
+        if let Err(e) = spawned {
+            return Ended::Camera(CameraError::Refused(format!(
+                "no thread for the spectrum: {e}"
+            )));
+        }
+        let mut handover = Handover {
+            reporter,
+            ready,
+            shared,
+            offset_ms: None,
+            last: false,
+        };
+        let ended = lines_until_end(source, &mut lines, &mut handover, config, notifier);
+        // The last window is worth waiting for.
+        handover.last = true;
+        lines.finish(&mut |collector, warnings| handover.give(collector, warnings));
+        ended
+    });
+    Ok((ended, lines.clock().counts()))
+}
+
+fn lines_until_end(
+    source: &mut dyn Source,
+    lines: &mut Lines<'_>,
+    handover: &mut Handover<'_, '_>,
+    config: &Config,
+    notifier: &Notifier,
+) -> Ended {
+    let shared = handover.shared;
+    let changes = shared.changes.load(Ordering::Acquire);
+    let silence = Duration::from_secs_f64(config.service.silence_s);
+    // Short waits, so that a stop is noticed soon.
+    let patience = silence.min(Duration::from_millis(200));
+    let mut heard = Instant::now();
+    let mut alive = Alive::new(notifier);
+    loop {
+        if shared.is_stopping() {
+            return Ended::Asked;
+        }
+        if shared.changes.load(Ordering::Acquire) != changes {
+            return Ended::Changed;
+        }
+        let outcome = source.next(patience, &mut |frame| {
+            lines.frame(&frame, &mut |collector, warnings| {
+                handover.give(collector, warnings);
+            });
+        });
+        match outcome {
+            Ok(()) => heard = Instant::now(),
+            Err(CameraError::Silent(_)) if heard.elapsed() < silence => {}
+            Err(CameraError::Silent(_)) => {
+                return Ended::Camera(CameraError::Silent(heard.elapsed()));
+            }
+            Err(error) => return Ended::Camera(error),
+        }
+        alive.tell();
+    }
+}
+
+/// Tells systemd now and then that lines are taken.
+struct Alive<'a> {
+    notifier: &'a Notifier,
+    every: Option<Duration>,
+    told: Instant,
+}
+
+impl<'a> Alive<'a> {
+    fn new(notifier: &'a Notifier) -> Self {
+        Self {
+            notifier,
+            every: Notifier::watchdog(),
+            told: Instant::now(),
+        }
+    }
+
+    fn tell(&mut self) {
+        if self.every.is_some_and(|every| self.told.elapsed() >= every) {
+            self.notifier.say("WATCHDOG=1");
+            self.told = Instant::now();
+        }
+    }
+}
+
+/// The line side's end of the way to the spectrum.
+struct Handover<'s, 'm> {
+    reporter: &'s Mutex<Reporter<'m>>,
+    ready: SyncSender<Ready>,
+    shared: &'s Shared,
+    offset_ms: Option<u64>,
+    /// No more lines come: waiting is allowed.
+    last: bool,
+}
+
+impl Handover<'_, '_> {
+    fn give(&mut self, collector: &mut Collector<'_>, warnings: Warnings) {
+        let reporter = if self.last {
+            self.reporter.lock().ok()
+        } else {
+            self.reporter.try_lock().ok()
+        };
+        let Some(mut reporter) = reporter else {
+            self.shared.dropped.fetch_add(1, Ordering::Relaxed);
+            return;
+        };
+        let offset_ms = *self.offset_ms.get_or_insert_with(|| {
+            // The first window is one window long already.
+            self.shared.started.elapsed().as_millis() as u64
+        });
+        if collector.hand_over(&mut reporter) {
+            drop(reporter);
+            let ready = Ready {
+                warnings,
+                offset_ms,
+            };
+            let sent = if self.last {
+                self.ready.send(ready).is_ok()
+            } else {
+                self.ready.try_send(ready).is_ok()
+            };
+            if !sent {
+                self.shared.dropped.fetch_add(1, Ordering::Relaxed);
+            }
+        }
+    }
+}
+
+/// The spectrum thread.
+fn compute(
+    windows: &Receiver<Ready>,
+    reporter: &Mutex<Reporter<'_>>,
+    reports: &SyncSender<Report>,
+    shared: &Shared,
+) {
+    let mut first_ms = None;
+    for ready in windows {
+        let mut report = match reporter.lock() {
+            Ok(mut reporter) => reporter.report(),
+            Err(_) => return,
+        };
+        report.warnings.0 |= ready.warnings.0;
+        // The core counts from the session's first frame, a board from its own start.
+        let first = *first_ms.get_or_insert(report.time_ms);
+        report.time_ms = ready.offset_ms + report.time_ms.saturating_sub(first);
+        if reports.try_send(report).is_err() {
+            shared.dropped.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+}

@@ -1,0 +1,262 @@
+//! From what the camera does and what is wanted to what the core is told.
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+use rowtone::camera::{Timing, TimingError};
+use rowtone::settings::{Region, Settings};
+use rowtone::spectrum;
+use rowtone::timeline::{BinnerError, Group, rows_per_sample};
+use rowtone::tracker;
+
+use crate::capture::{Facts, Shape};
+use crate::config::{CameraConfig, Config, USUAL_HIGHEST_HZ};
+use crate::sensor;
+
+/// Samples of a window that are aimed at, at most: memory and spectrum work grow with them.
+const WINDOW_SAMPLES: usize = 65_536;
+
+/// All that measuring needs to know.
+#[derive(Clone, Debug)]
+pub struct Setup {
+    /// How frames lie in memory.
+    pub shape: Shape,
+    /// Part of the picture that is measured.
+    pub part: Region,
+    /// Start of exposure of the part's first row after that of the picture's, ns.
+    pub part_start_ns: i64,
+    /// For the tracker.
+    pub tracker: tracker::Config,
+    /// For binner and collector.
+    pub group: Group,
+    /// For the spectrum.
+    pub spectrum: spectrum::Config,
+    /// Frames of a window, some spare.
+    pub window_frames: usize,
+    /// What the user should know: where the line time comes from, what was rounded.
+    pub remarks: Vec<String>,
+}
+
+/// Why measuring cannot begin.
+#[derive(Clone, Debug, PartialEq)]
+pub enum SetupError {
+    /// Nobody knows the line time.
+    NoLineTime {
+        /// The camera.
+        camera: String,
+    },
+    /// A calibration file without a usable `line_time_s`.
+    Calibration {
+        /// The file.
+        file: PathBuf,
+        /// What is wrong with it.
+        why: String,
+    },
+    /// The region is not in the picture.
+    Region {
+        /// What was asked for.
+        region: Region,
+        /// Size of the picture.
+        picture: (u16, u16),
+    },
+    /// The line time cannot be.
+    Timing(TimingError),
+    /// Too few rows.
+    Group(BinnerError),
+}
+
+impl fmt::Display for SetupError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NoLineTime { camera } => write!(
+                f,
+                "the line time of {camera} is not known: measure it with `rowtone calibrate` and give \
+                 camera.calibration or camera.line_time_us"
+            ),
+            Self::Calibration { file, why } => write!(f, "{}: {why}", file.display()),
+            Self::Region { region, picture } => write!(
+                f,
+                "roi {},{} {}x{} does not lie in the picture of {}x{}",
+                region.x, region.y, region.width, region.height, picture.0, picture.1
+            ),
+            Self::Timing(e) => e.fmt(f),
+            Self::Group(e) => e.fmt(f),
+        }
+    }
+}
+
+impl std::error::Error for SetupError {}
+
+impl Setup {
+    /// Joins camera, file and settings.
+    ///
+    /// # Errors
+    /// [`SetupError`] when they do not fit together.
+    pub fn new(facts: &Facts, config: &Config, settings: &Settings) -> Result<Self, SetupError> {
+        let shape = facts.shape;
+        let mut remarks = Vec::new();
+        let line_time_s = line_time_s(facts, &config.camera, &mut remarks)?;
+        let part = part(&shape, settings.roi, &mut remarks)?;
+        let line_time_ps = (line_time_s * 1e12).round() as u32;
+        let timing = Timing::new(line_time_ps, config.exposure_us() * 1000, part.height)
+            .map_err(SetupError::Timing)?;
+        let whole = Timing::new(line_time_ps, 0, shape.height).map_err(SetupError::Timing)?;
+        let highest_hz = settings.max_hz.unwrap_or(USUAL_HIGHEST_HZ);
+        let period_ns = facts.frame_period_ns.unwrap_or(whole.readout_ns()).max(1);
+        let frames = f64::from(settings.window_s) * 1e9 / period_ns as f64;
+        let rows = rows_per_sample(timing, highest_hz, frames as u32, WINDOW_SAMPLES);
+        let group = Group::new(timing, rows).map_err(SetupError::Group)?;
+        let tracker = tracker::Config {
+            bits: shape.format.bits(),
+            stride: if shape.bayer { 2 } else { 1 },
+            learn_frames: config.camera.learn_frames,
+            ..tracker::Config::new(timing, part.width)
+        };
+        let nanoseconds = |s: f32| (f64::from(s) * 1e9).round() as i64;
+        let spectrum = spectrum::Config {
+            window_ns: nanoseconds(settings.window_s),
+            hop_ns: nanoseconds(settings.hop_s),
+            min_hz: settings.min_hz,
+            max_hz: settings.max_hz,
+            max_peaks: settings.max_peaks.into(),
+            false_alarm: settings.false_alarm,
+            um_per_px: settings.um_per_px,
+        };
+        Ok(Self {
+            shape,
+            part,
+            part_start_ns: whole.start_ns(part.y),
+            tracker,
+            group,
+            spectrum,
+            window_frames: (frames * 1.25) as usize + 2,
+            remarks,
+        })
+    }
+}
+
+/// In this order: file, calibration, driver, table.
+fn line_time_s(
+    facts: &Facts,
+    camera: &CameraConfig,
+    remarks: &mut Vec<String>,
+) -> Result<f64, SetupError> {
+    let (seconds, from) = if let Some(seconds) = camera.line_time_s {
+        (seconds, "the configuration".to_owned())
+    } else if let Some(file) = &camera.calibration {
+        (calibrated(file)?, file.display().to_string())
+    } else if let Some((seconds, who)) = facts.line_time {
+        (seconds, who.to_owned())
+    } else if let Some(mode) = sensor::lookup(&facts.id, facts.shape.width, facts.shape.height) {
+        let from = "the sensor table: kernels differ, calibrate to be sure".to_owned();
+        (f64::from(mode.line_time_ps) * 1e-12, from)
+    } else {
+        let camera = facts.id.clone();
+        return Err(SetupError::NoLineTime { camera });
+    };
+    remarks.push(format!("line time {:.4} us, from {from}", seconds * 1e6));
+    Ok(seconds)
+}
+
+/// `line_time_s` of a calibration file.
+fn calibrated(file: &Path) -> Result<f64, SetupError> {
+    let refuse = |why: String| SetupError::Calibration {
+        file: file.to_owned(),
+        why,
+    };
+    let text = std::fs::read_to_string(file).map_err(|e| refuse(format!("cannot be read: {e}")))?;
+    let table: toml::Table = text
+        .parse()
+        .map_err(|e: toml::de::Error| refuse(e.message().to_owned()))?;
+    table
+        .get("line_time_s")
+        .and_then(toml::Value::as_float)
+        .filter(|s| (1e-7..4e-3).contains(s))
+        .ok_or_else(|| {
+            refuse("no usable line_time_s in it: make it with `rowtone calibrate`".into())
+        })
+}
+
+/// The part to measure, its left edge moved to where a group of packed pixels begins.
+fn part(
+    shape: &Shape,
+    roi: Option<Region>,
+    remarks: &mut Vec<String>,
+) -> Result<Region, SetupError> {
+    let Some(roi) = roi else {
+        return Ok(Region {
+            x: 0,
+            y: 0,
+            width: shape.width,
+            height: shape.height,
+        });
+    };
+    let inside =
+        |from: u16, length: u16, all: u16| u32::from(from) + u32::from(length) <= all.into();
+    if !inside(roi.x, roi.width, shape.width) || !inside(roi.y, roi.height, shape.height) {
+        return Err(SetupError::Region {
+            region: roi,
+            picture: (shape.width, shape.height),
+        });
+    }
+    let x = roi.x - roi.x % shape.format.group() as u16;
+    if x != roi.x {
+        remarks.push(format!(
+            "roi begins at x = {x}: packed pixels come in groups"
+        ));
+    }
+    Ok(Region { x, ..roi })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rowtone::raw::RawFormat;
+
+    fn facts(id: &str, line_time: Option<(f64, &'static str)>) -> Facts {
+        Facts {
+            id: id.to_owned(),
+            shape: Shape {
+                width: 1332,
+                height: 990,
+                stride: 1728,
+                format: RawFormat::Packed10,
+                bayer: true,
+            },
+            line_time,
+            frame_period_ns: Some(8_330_000),
+            reasons: String::new(),
+        }
+    }
+
+    #[test]
+    fn the_nearest_source_of_the_line_time_counts() {
+        let config = Config::defaults();
+        let setup = |facts: &Facts, config: &Config| Setup::new(facts, config, &config.settings);
+        let table = setup(&facts("imx477", None), &config).unwrap();
+        assert_eq!(table.tracker.timing.line_time_ps(), 7_933_000);
+        assert!(table.remarks[0].contains("calibrate"));
+        let driver = setup(&facts("imx477", Some((8e-6, "the driver"))), &config).unwrap();
+        assert_eq!(driver.tracker.timing.line_time_ps(), 8_000_000);
+        assert!(matches!(
+            setup(&facts("virtual", None), &config),
+            Err(SetupError::NoLineTime { .. })
+        ));
+        let given = Config::parse("[camera]\nline_time_us = 9.5", "f").unwrap();
+        let setup = setup(&facts("virtual", None), &given).unwrap();
+        assert_eq!(setup.tracker.timing.line_time_ps(), 9_500_000);
+        assert_eq!((setup.tracker.bits, setup.tracker.stride), (10, 2));
+    }
+
+    #[test]
+    fn a_region_is_cut_where_pixels_can_be() {
+        let config = Config::parse("[camera]\nroi = [6, 100, 640, 200]", "f").unwrap();
+        let setup = Setup::new(&facts("imx477", None), &config, &config.settings).unwrap();
+        assert_eq!((setup.part.x, setup.part.width), (4, 640));
+        assert_eq!(setup.part_start_ns, 793_300);
+        assert_eq!(setup.group.timing().rows(), 200);
+        let config = Config::parse("[camera]\nroi = [1000, 0, 640, 200]", "f").unwrap();
+        let error = Setup::new(&facts("imx477", None), &config, &config.settings).unwrap_err();
+        assert!(error.to_string().contains("1332x990"), "{error}");
+    }
+}

@@ -1,0 +1,56 @@
+//! The few things that only the operating system's C interface gives.
+#![allow(unsafe_code)]
+
+use std::io;
+
+/// Gives the calling thread a real-time priority (SCHED_FIFO), 1 to 99.
+///
+/// # Errors
+/// The system does not allow it: systemd's `LimitRTPRIO=` does.
+pub fn set_realtime_priority(priority: u8) -> io::Result<()> {
+    // SAFETY: an all-zero sched_param is valid, and the call reads it only.
+    let outcome = unsafe {
+        let mut param: libc::sched_param = std::mem::zeroed();
+        param.sched_priority = i32::from(priority);
+        // Threads that this one starts later are not to inherit it.
+        libc::sched_setscheduler(0, libc::SCHED_FIFO | libc::SCHED_RESET_ON_FORK, &param)
+    };
+    if outcome == 0 {
+        Ok(())
+    } else {
+        Err(io::Error::last_os_error())
+    }
+}
+
+/// Keeps the process's memory out of swap.
+///
+/// # Errors
+/// The system does not allow it: systemd's `LimitMEMLOCK=` does.
+pub fn lock_memory() -> io::Result<()> {
+    // SAFETY: takes no pointer.
+    let outcome = unsafe { libc::mlockall(libc::MCL_CURRENT | libc::MCL_FUTURE) };
+    if outcome == 0 {
+        Ok(())
+    } else {
+        Err(io::Error::last_os_error())
+    }
+}
+
+/// Anonymous memory with a file descriptor.
+///
+/// # Errors
+/// The system has none.
+#[cfg(feature = "libcamera")]
+pub fn memory_file(bytes: usize) -> io::Result<std::os::fd::OwnedFd> {
+    use std::os::fd::FromRawFd;
+    // SAFETY: the name ends with a zero; the descriptor is new and owned by nobody else.
+    let file = unsafe {
+        let fd = libc::memfd_create(c"rowtone-frame".as_ptr(), libc::MFD_CLOEXEC);
+        if fd < 0 {
+            return Err(io::Error::last_os_error());
+        }
+        std::fs::File::from_raw_fd(fd)
+    };
+    file.set_len(bytes as u64)?;
+    Ok(file.into())
+}

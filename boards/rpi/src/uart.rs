@@ -1,0 +1,197 @@
+//! The output thread: reports out, commands in, on a port that may go away and come back.
+
+use std::io::{self, ErrorKind, Read, Write};
+use std::sync::PoisonError;
+use std::sync::atomic::Ordering;
+use std::sync::mpsc::{Receiver, RecvTimeoutError};
+use std::time::{Duration, Instant};
+
+use rowtone::link::Link;
+use rowtone::report::Report;
+use rowtone::settings::Settings;
+use rowtone::settings::store::Keep;
+use serialport::SerialPort;
+
+use crate::backoff::Backoff;
+use crate::config::OutputConfig;
+use crate::session::Shared;
+
+/// How long a loop waits for a report before it looks at the line again.
+const STEP: Duration = Duration::from_millis(5);
+/// After the end, how long the line may take for what is left.
+const LAST_WORDS: Duration = Duration::from_secs(2);
+
+/// Where bytes go to and come from.
+enum Port {
+    Serial(Box<dyn SerialPort>),
+    Stdout(io::Stdout),
+}
+
+impl Port {
+    fn open(config: &OutputConfig) -> io::Result<Self> {
+        if config.port == "-" {
+            return Ok(Self::Stdout(io::stdout()));
+        }
+        let port = serialport::new(&config.port, config.baud)
+            .timeout(STEP)
+            .exclusive(false)
+            .open()?;
+        Ok(Self::Serial(port))
+    }
+
+    /// What has come; nothing where nothing has.
+    fn read(&mut self, to: &mut [u8]) -> io::Result<usize> {
+        let Self::Serial(port) = self else {
+            return Ok(0);
+        };
+        let waiting = port.bytes_to_read()? as usize;
+        match to.get_mut(..waiting.min(to.len())) {
+            Some(to) if !to.is_empty() => port.read(to),
+            _ => Ok(0),
+        }
+    }
+
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let written = match self {
+            Self::Serial(port) => port.write(bytes),
+            Self::Stdout(out) => out
+                .write_all(bytes)
+                .and_then(|()| out.flush())
+                .map(|()| bytes.len()),
+        };
+        match written {
+            Err(e)
+                if matches!(
+                    e.kind(),
+                    ErrorKind::TimedOut | ErrorKind::WouldBlock | ErrorKind::Interrupted
+                ) =>
+            {
+                Ok(0)
+            }
+            other => other,
+        }
+    }
+}
+
+/// One line, until the program ends.
+pub struct Uart<'a, K> {
+    /// Where it is.
+    pub config: OutputConfig,
+    /// The core's end of it.
+    pub link: Link<'a>,
+    /// Where settings are kept.
+    pub store: K,
+}
+
+impl<K: Keep> Uart<'_, K> {
+    /// Serves the line until no more reports come and all is said.
+    pub fn run(mut self, reports: &Receiver<Report>, shared: &Shared) {
+        let mut port: Option<Port> = None;
+        let mut backoff = Backoff::new(Duration::from_millis(500), Duration::from_secs(10));
+        let mut ended: Option<Instant> = None;
+        let mut told = false;
+        loop {
+            match reports.recv_timeout(STEP) {
+                Ok(report) => self.link.push(report),
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => {
+                    ended.get_or_insert_with(Instant::now);
+                }
+            }
+            if port.is_none() && backoff.is_due() {
+                match Port::open(&self.config) {
+                    Ok(open) => {
+                        port = Some(open);
+                        backoff.reset();
+                        told = false;
+                        self.link.announce(now_us(shared));
+                    }
+                    Err(e) if !told => {
+                        eprintln!(
+                            "rowtone-rpi: {}: cannot be opened: {e}; trying again",
+                            self.config.port
+                        );
+                        told = true;
+                        backoff.failed();
+                    }
+                    Err(_) => {
+                        backoff.failed();
+                    }
+                }
+            }
+            let said = match port.as_mut().map(|port| self.serve(port, shared)) {
+                Some(Ok(idle)) => idle,
+                Some(Err(e)) => {
+                    eprintln!(
+                        "rowtone-rpi: {}: went away ({e}); trying again",
+                        self.config.port
+                    );
+                    port = None;
+                    backoff.failed();
+                    if self.config.port == "-" {
+                        shared.stop.store(true, Ordering::Relaxed); // nobody reads any more
+                        return;
+                    }
+                    false
+                }
+                None => false,
+            };
+            if ended.is_some_and(|at| said || at.elapsed() > LAST_WORDS) {
+                if let Some(Port::Serial(port)) = &mut port {
+                    // Until the last byte has left, at most as long as a line takes at this speed.
+                    let end = Instant::now() + LAST_WORDS;
+                    while port.bytes_to_write().is_ok_and(|n| n > 0) && Instant::now() < end {
+                        std::thread::sleep(STEP);
+                    }
+                }
+                return;
+            }
+        }
+    }
+
+    /// Takes what came, sends what is to send; whether all is said.
+    fn serve(&mut self, port: &mut Port, shared: &Shared) -> io::Result<bool> {
+        let mut bytes = [0; 256];
+        let count = port.read(&mut bytes)?;
+        for &byte in bytes.get(..count).unwrap_or_default() {
+            self.link.receive(byte, now_us(shared), &mut self.store);
+        }
+        if count > 0 {
+            self.pass_on(shared);
+        }
+        loop {
+            let waiting = self.link.poll(now_us(shared), &mut self.store);
+            if waiting.is_empty() {
+                return Ok(true);
+            }
+            let taken = port.write(waiting)?;
+            if taken == 0 {
+                return Ok(false);
+            }
+            self.link.sent(taken);
+        }
+    }
+
+    /// Tells the measuring side when something that it uses was changed.
+    fn pass_on(&self, shared: &Shared) {
+        let new = *self.link.console().settings();
+        let mut current = shared
+            .settings
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
+        let measured = |s: Settings| Settings {
+            wire: new.wire,
+            unit: new.unit,
+            ..s
+        };
+        if measured(*current) != new {
+            *current = new;
+            shared.changes.fetch_add(1, Ordering::Release);
+        }
+    }
+}
+
+/// Time since the program began, µs.
+fn now_us(shared: &Shared) -> u64 {
+    shared.started.elapsed().as_micros() as u64
+}
