@@ -14,7 +14,9 @@ command -v qemu-aarch64-static >/dev/null || {
     exit 1
 }
 for processor in max cortex-a53; do
-    echo "== $processor"
-    CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_RUNNER="qemu-aarch64-static -cpu $processor -L /usr/aarch64-linux-gnu" \
+    case $processor in max) kernel=NeonDot ;; *) kernel=Neon ;; esac
+    echo "== $processor: $kernel"
+    ROWTONE_EXPECT_KERNEL=$kernel \
+        CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_RUNNER="qemu-aarch64-static -cpu $processor -L /usr/aarch64-linux-gnu" \
         tools/aarch64-cargo.sh test -p rowtone --features std --lib --release -- "$@"
 done

@@ -180,6 +180,17 @@ mod tests {
         }
     }
 
+    /// tools/test-aarch64.sh says which kernel each of its processors must choose.
+    #[test]
+    fn the_expected_kernel_is_chosen() {
+        if let Some(expected) = std::env::var_os("ROWTONE_EXPECT_KERNEL") {
+            assert_eq!(
+                std::format!("{:?}", Kernel::detect()),
+                expected.to_string_lossy()
+            );
+        }
+    }
+
     #[test]
     fn the_shorter_side_counts() {
         for kernel in Kernel::all() {
