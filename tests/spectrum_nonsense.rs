@@ -16,6 +16,11 @@ impl Draw {
         self.0
     }
 
+    /// True once in `times`.
+    fn once_in(&mut self, times: u64) -> bool {
+        self.next().is_multiple_of(times)
+    }
+
     fn of<T: Copy>(&mut self, choices: &[T]) -> T {
         choices[self.next() as usize % choices.len()]
     }
@@ -79,7 +84,7 @@ fn nothing_panics_and_all_is_finite() {
         // Half of the seeds are mostly sane, with odd things strewn in.
         let sane = seed % 2 == 0;
         for _ in 0..120 {
-            let often = if sane { draw.next() % 16 == 0 } else { true };
+            let often = !sane || draw.once_in(16);
             start_ns = start_ns.saturating_add(if often { draw.of(&jumps) } else { 16_000_000 });
             frame = frame.wrapping_add(if often {
                 draw.of(&[0, 1, 2, u32::MAX, 77_777])
@@ -88,9 +93,9 @@ fn nothing_panics_and_all_is_finite() {
             });
             for slot in 0..group.slots() {
                 let strange = if sane {
-                    draw.next() % 64 == 0
+                    draw.once_in(64)
                 } else {
-                    draw.next() % 2 == 0
+                    draw.once_in(2)
                 };
                 let unit = (draw.next() >> 40) as f32 / (1 << 24) as f32;
                 let sample = Sample {
@@ -104,7 +109,7 @@ fn nothing_panics_and_all_is_finite() {
                     shift_px: if strange { draw.of(&odd) } else { unit },
                     information_per_px2: if strange { draw.of(&odd) } else { 1e4 },
                 };
-                if analyzer.push(sample) && draw.next() % 4 != 0 {
+                if analyzer.push(sample) && !draw.once_in(4) {
                     let report = analyzer.report().expect("a window was ready");
                     assert!(is_sane(&report), "{report:?}");
                 }
