@@ -11,10 +11,12 @@ pub(super) struct Flicker {
     before: Option<f32>,
     /// Relative change of the light from row to row, averaged over some rows.
     slope: f32,
+    /// Weight of the newest row in that.
+    share: f32,
 }
 
 impl Flicker {
-    /// Share of the newest row.
+    /// Weight of the newest row, once there are enough.
     const SHARE: f32 = 0.25;
 
     /// The light does not change faster than this from row to row: what does is something else.
@@ -22,6 +24,7 @@ impl Flicker {
 
     pub(super) fn begin_frame(&mut self) {
         self.before = None;
+        self.share = 1.0;
     }
 
     /// Takes the brightness of a row, as the factor that brings it to its reference's.
@@ -30,7 +33,9 @@ impl Flicker {
         if let Some(before) = self.before {
             let change = before / to_reference - 1.0;
             if change.abs() < Self::STEEPEST {
-                self.slope += (change - self.slope) * Self::SHARE;
+                self.slope += (change - self.slope) * self.share;
+                // 1, 1/2, 1/3, then 1/4: the plain mean at first.
+                self.share = (self.share / (1.0 + self.share)).max(Self::SHARE);
             }
         }
         self.before = Some(to_reference);

@@ -22,6 +22,8 @@ pub struct RowLearning {
     pub(super) shift_px: f32,
     /// Frames that the reference is the mean of.
     pub(super) frames: u16,
+    /// Mean brightness of the lines against the reference.
+    light: f32,
 }
 
 /// What learning keeps of a column.
@@ -84,6 +86,7 @@ impl Tracker<'_> {
                 self.settle_noise();
                 self.mask_dead_columns();
                 self.settle_margin();
+                self.even_light();
                 self.centre_rows();
                 if self.config.level.is_none() {
                     self.choose_level();
@@ -97,6 +100,7 @@ impl Tracker<'_> {
             Stage::Refining => {
                 self.settle_noise();
                 self.settle_margin();
+                self.even_light();
                 self.build_all();
                 self.stage = Stage::Tracking;
             }
@@ -175,11 +179,11 @@ impl Tracker<'_> {
         learning.frames = learning.frames.saturating_add(1).min(memory);
         let keep = 1.0 / f32::from(learning.frames);
         // A line ten times darker than its reference is no measure of brightness.
-        let bright = if self.to_reference < 10.0 {
-            self.to_reference
-        } else {
-            1.0
+        let bright = match self.to_reference {
+            bright if bright < 10.0 => bright,
+            _ => 1.0,
         };
+        learning.light += (1.0 / bright - learning.light) * keep;
         align::average_in(mean, pixels, shift_px, keep * bright, keep, &self.recipe);
     }
 
@@ -235,6 +239,20 @@ impl Tracker<'_> {
             }
         }
         self.recipe.level = best.1;
+    }
+
+    /// Gives each row the mean brightness of its lines: that of the first frame, against which they were
+    /// all brought, bears the pattern of a flickering lamp.
+    fn even_light(&mut self) {
+        let width = usize::from(self.config.width);
+        let rows = self.storage.mean.chunks_exact_mut(width);
+        for (mean, learning) in rows.zip(self.storage.learning.iter()) {
+            if learning.light > 0.0 {
+                for m in mean {
+                    *m = (f32::from(*m) * learning.light + 0.5) as u16;
+                }
+            }
+        }
     }
 
     /// Moves each row's reference by whole pixels to the middle of its motion: the first frame, to which
