@@ -40,7 +40,7 @@ for folder in "$(cd "$(dirname "$0")/.." && pwd)/" "${CARGO_HOME:-$HOME/.cargo}"
     "$("$debian_rustc" --print sysroot 2>/dev/null || true)"/lib/rustlib/src/rust/; do
     [ ! -d "$folder" ] || flags+=("'--remap-path-prefix=$folder='")
 done
-cargo_flags=(--target "$target" --config "target.'$target'.rustflags=[$(IFS=,; echo "${flags[*]}")]")
+cargo_flags=(--target "$target" --config "target.$target.rustflags=[$(IFS=,; echo "${flags[*]}")]")
 
 if has_target rustc; then
     exec cargo "$verb" "${cargo_flags[@]}" "$@"

@@ -6,9 +6,13 @@
 //! |h| ≤ [`MAX_COEFFICIENT`], so that a pair of products u8 × i8 never leaves 16 bits.
 #![allow(unsafe_code)]
 
+<<<<<<< HEAD
 #[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
 mod aarch64;
 #[cfg(all(target_arch = "arm", target_feature = "dsp"))]
+=======
+#[cfg(all(target_arch = "arm", any(target_feature = "dsp", rowtone_dsp)))]
+>>>>>>> 47e617f (Tell the kernels of the DSP extension where stable Rust does not; a script that holds board and host together)
 mod cortex_m;
 mod portable;
 #[cfg(target_arch = "x86_64")]
@@ -33,7 +37,7 @@ pub enum Kernel {
     /// Plain Rust, for every machine.
     Portable,
     /// Cortex-M with the DSP extension: two products an instruction.
-    #[cfg(all(target_arch = "arm", target_feature = "dsp"))]
+    #[cfg(all(target_arch = "arm", any(target_feature = "dsp", rowtone_dsp)))]
     CortexM,
     /// x86-64 with AVX2: 32 pixels a step.
     #[cfg(target_arch = "x86_64")]
@@ -53,8 +57,9 @@ impl Kernel {
         if x86_64::available() {
             return Self::Avx2;
         }
-        #[cfg(all(target_arch = "arm", target_feature = "dsp"))]
+        #[cfg(all(target_arch = "arm", any(target_feature = "dsp", rowtone_dsp)))]
         return Self::CortexM;
+<<<<<<< HEAD
         #[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
         return if aarch64::has_dot_product() {
             Self::NeonDot
@@ -65,6 +70,9 @@ impl Kernel {
             all(target_arch = "arm", target_feature = "dsp"),
             all(target_arch = "aarch64", target_feature = "neon")
         )))]
+=======
+        #[cfg(not(all(target_arch = "arm", any(target_feature = "dsp", rowtone_dsp))))]
+>>>>>>> 47e617f (Tell the kernels of the DSP extension where stable Rust does not; a script that holds board and host together)
         Self::Portable
     }
 
@@ -87,7 +95,7 @@ impl Kernel {
     pub fn sums_u8(self, pixels: &[u8], coefficients: &[i8]) -> Sums {
         match self {
             Self::Portable => portable::sums_u8(pixels, coefficients),
-            #[cfg(all(target_arch = "arm", target_feature = "dsp"))]
+            #[cfg(all(target_arch = "arm", any(target_feature = "dsp", rowtone_dsp)))]
             Self::CortexM => cortex_m::sums_u8(pixels, coefficients),
             // SAFETY: the variant is only made by `detect`, which asked the processor for AVX2.
             #[cfg(target_arch = "x86_64")]
@@ -107,7 +115,7 @@ impl Kernel {
         match self {
             Self::Portable => portable::sums_u16(pixels, coefficients),
             // Deeper pixels come from larger boards: plain Rust serves.
-            #[cfg(all(target_arch = "arm", target_feature = "dsp"))]
+            #[cfg(all(target_arch = "arm", any(target_feature = "dsp", rowtone_dsp)))]
             Self::CortexM => portable::sums_u16(pixels, coefficients),
             // SAFETY: the variant is only made by `detect`, which asked the processor for AVX2.
             #[cfg(target_arch = "x86_64")]
