@@ -10,6 +10,12 @@ use crate::report::MAX_PEAKS;
 /// Furthest a frequency may move in one step, turns a window length.
 const LONGEST_STEP: f32 = 0.3;
 
+/// A step that lowers the sum of squares by less than this many noise variances is the last.
+const ENOUGH: f32 = 0.3;
+
+/// After a step that lowers it by less than this many, the matrix need not be made again.
+const SOON: f32 = 1000.0;
+
 /// What is fitted to a window.
 #[derive(Clone, Debug)]
 pub(crate) struct Model {
@@ -95,6 +101,8 @@ impl Fit {
         let freedom = Self::freedom(samples, model).max(1.0);
         let mut best: Option<Model> = None;
         let mut shorter = 1.0;
+        let mut last_gain = f32::INFINITY;
+        let mut current = false;
         for step in 0..=steps {
             let slow = self.evaluate(samples, model);
             if let Some(best) = &best
@@ -116,8 +124,12 @@ impl Fit {
                 return;
             }
             let regressors = Regressors::of(&model.tones, model.drift_powers);
-            samples.normal(&regressors, &model.tones, &mut self.normal);
-            self.normal.factor();
+            let settled = !model.tones.iter().any(|t| t.amplitude.norm_sqr() == 0.0);
+            // Near the end the matrix hardly changes: it serves as long as each step gains much less than the one before.
+            if !current {
+                samples.normal(&regressors, &model.tones, &mut self.normal);
+                self.normal.factor();
+            }
             let gradient = self.gradient(&regressors, slow);
             self.unknowns = gradient;
             self.normal.solve(&mut self.unknowns);
@@ -127,10 +139,19 @@ impl Fit {
                 .take(regressors.list().len())
                 .map(|(g, u)| g * u)
                 .sum();
-            let settled = !model.tones.iter().any(|t| t.amplitude.norm_sqr() == 0.0);
-            if !gain.is_finite() || (settled && gain < 0.01 * model.squares / freedom) {
+            if !gain.is_finite() {
                 return;
             }
+            let noise = model.squares / freedom;
+            if settled && gain < ENOUGH * noise {
+                // So near, the sum of squares is the parabola that it is taken for: no need to look.
+                self.apply(model, &regressors, 1.0, samples.length_s);
+                model.squares -= gain.max(0.0);
+                return;
+            }
+            current =
+                settled && gain < SOON * noise.max(1e-4 * last_gain) && gain < 0.1 * last_gain;
+            last_gain = gain;
             best = Some(model.clone());
             shorter = 1.0;
             self.apply(model, &regressors, 1.0, samples.length_s);

@@ -95,6 +95,22 @@ impl Samples<'_> {
         frames.min(slots).min(TABLE_ROWS).saturating_sub(1)
     }
 
+    /// Power that a periodogram has `hz`, a multiple of the frame rate, away from a tone, over the tone's own.
+    pub(crate) fn ghost(&self, hz: f32) -> f32 {
+        let frequency = Frequency::from_hz(hz);
+        let mut sum = Complex::new(0.0, 0.0);
+        for (&ns, &w) in self
+            .slot_ns
+            .iter()
+            .zip(self.slot_weight.iter())
+            .take(self.slots)
+        {
+            let (re, im) = cos_sin(frequency.phase(ns));
+            sum += Complex::new(re, im).scale(w);
+        }
+        sum.norm_sqr() / (self.total_weight * self.total_weight)
+    }
+
     /// Fills table row `k` for `tone`.
     pub(crate) fn tabulate(&mut self, k: usize, tone: &Tone) {
         let n = self.frames;

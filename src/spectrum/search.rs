@@ -17,6 +17,9 @@ const CLOSEST: f32 = 0.7;
 /// Where the ghosts of a tone are, in frame rates from it.
 const GHOSTS: [f32; 4] = [1.0, -1.0, 2.0, -2.0];
 
+/// Power of a tone's ghosts over its own below which they are not tried in its place.
+const LOW_GHOST: f32 = 0.15;
+
 /// With fewer frames, a drift is fitted only where it is seen.
 const FEW_FRAMES: usize = 16;
 
@@ -288,6 +291,10 @@ impl Search {
         let Some(fps) = self.band.fps else {
             return false;
         };
+        // With little blank time ghosts are too low to be taken for the tone, even two at one place.
+        if samples.ghost(fps).max(samples.ghost(2.0 * fps)) < LOW_GHOST {
+            return false;
+        }
         let mut changed = false;
         for i in 0..model.tones.len() {
             if self.tired(fit) || model.tones.get(i).is_none_or(|t| t.modulated) {
