@@ -154,9 +154,11 @@ impl Search {
         }
         let mut best: Option<Model> = None;
         for candidate in &candidates {
-            // Rivals of the first are its ghosts, or it is theirs; the rest only count where these come to nothing.
-            if best.is_some() && candidate.gain < 0.5 * first.gain {
-                break;
+            // Rivals of the first are its ghosts, or it is theirs; others only count where these come to nothing.
+            let rival =
+                candidate.gain > 0.5 * first.gain && self.ghostly(samples, first, *candidate);
+            if best.is_some() && !rival {
+                continue;
             }
             for start in self.starts(samples, candidate.frequency) {
                 if self.tired(fit) {
@@ -180,6 +182,15 @@ impl Search {
             }
             _ => false,
         }
+    }
+
+    /// Two candidates lie a multiple of the frame rate apart.
+    fn ghostly(&self, samples: &Samples<'_>, a: Candidate, b: Candidate) -> bool {
+        self.band.fps.is_some_and(|fps| {
+            let apart = b.frequency.above(a.frequency);
+            let away = apart - fps * libm::roundf(apart / fps);
+            away.abs() * samples.length_s < 1.5
+        })
     }
 
     /// Where to refine a candidate from. Near a multiple of the frame rate a tone looks much like one as far on the
