@@ -13,15 +13,18 @@
 //! - [`spectrum_scenes`]: random displacement samples with known tones, for the spectrum's figures;
 //! - [`commands`]: one file a command, each with its options and what it does;
 //! - [`failure`]: what every command says, and exits with, when it cannot go on.
+//! - [`line`] follows a port that comes and goes, and [`receiver`] understands what it says.
 
 pub mod analysis;
 pub mod calibrate;
 pub mod commands;
 pub mod failure;
 pub mod input;
+pub mod line;
 pub mod linear;
 pub mod memory;
 pub mod output;
+pub mod receiver;
 pub mod ring;
 pub mod serial;
 pub mod sim;

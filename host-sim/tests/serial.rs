@@ -41,7 +41,7 @@ fn what_analyze_sends_monitor_shows() {
     let _alone = alone();
     let (mut board, _board_end, board_name) = pair();
     let (mut host, host_end, host_name) = pair();
-    let mut monitor = command(["monitor", &host_name, "--format", "json"])
+    let mut monitor = command(["monitor", &host_name, "--once", "--format", "json"])
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
