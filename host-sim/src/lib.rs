@@ -13,12 +13,14 @@
 //! - [`spectrum_scenes`]: random displacement samples with known tones, for the spectrum's figures;
 //! - [`commands`]: one file a command, each with its options and what it does;
 //! - [`failure`]: what every command says, and exits with, when it cannot go on.
-//! - [`line`] follows a port that comes and goes, and [`receiver`] understands what it says.
+//! - [`line`] follows a port that comes and goes, and [`receiver`] understands what it says; [`gateway`]:
+//!   many lines to an MQTT broker.
 
 pub mod analysis;
 pub mod calibrate;
 pub mod commands;
 pub mod failure;
+pub mod gateway;
 pub mod input;
 pub mod line;
 pub mod linear;

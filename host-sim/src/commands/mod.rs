@@ -16,6 +16,7 @@ pub mod analyze;
 pub mod calibrate;
 pub mod demo;
 pub mod displacement;
+pub mod gateway;
 pub mod monitor;
 pub mod simulate;
 pub mod sweep;
@@ -44,6 +45,8 @@ enum Command {
     Displacement(displacement::Args),
     /// Decodes what a board sends over a serial port
     Monitor(monitor::Args),
+    /// Sends the reports of many boards to an MQTT broker
+    Gateway(gateway::Args),
     /// Writes a simulated clip, with the truth beside it
     Simulate(simulate::Args),
     /// Line time, read-out, blank time and exposure of a camera, from a flashing light
@@ -58,6 +61,7 @@ fn run(command: &Command) -> Result<(), Failure> {
         Command::Analyze(args) => analyze::run(args),
         Command::Displacement(args) => displacement::run(args),
         Command::Monitor(args) => monitor::run(args),
+        Command::Gateway(args) => gateway::run(args),
         Command::Simulate(args) => simulate::run(args),
         Command::Calibrate(args) => calibrate::run(args),
         Command::Sweep(args) => sweep::run(args),
