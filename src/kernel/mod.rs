@@ -6,13 +6,9 @@
 //! |h| ≤ [`MAX_COEFFICIENT`], so that a pair of products u8 × i8 never leaves 16 bits.
 #![allow(unsafe_code)]
 
-<<<<<<< HEAD
 #[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
 mod aarch64;
-#[cfg(all(target_arch = "arm", target_feature = "dsp"))]
-=======
 #[cfg(all(target_arch = "arm", any(target_feature = "dsp", rowtone_dsp)))]
->>>>>>> 47e617f (Tell the kernels of the DSP extension where stable Rust does not; a script that holds board and host together)
 mod cortex_m;
 mod portable;
 #[cfg(target_arch = "x86_64")]
@@ -30,10 +26,12 @@ pub struct Sums {
     pub pixels: u64,
 }
 
-/// Which implementation is used.
+/// Which implementation is used. Only those that the processor can run can be had.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Kernel {
+pub struct Kernel(Kind);
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
     /// Plain Rust, for every machine.
     Portable,
     /// Cortex-M with the DSP extension: two products an instruction.
@@ -45,84 +43,99 @@ pub enum Kernel {
     /// 64-bit Arm: 16 pixels a step.
     #[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
     Neon,
-    /// 64-bit Arm with the dot-product instructions: 32 pixels a step.
+    /// 64-bit Arm with the dot product of ARMv8.2.
     #[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
     NeonDot,
 }
 
 impl Kernel {
+    /// Plain Rust, for every machine.
+    pub const PORTABLE: Self = Self(Kind::Portable);
+
     /// The fastest kernel that this processor can run.
     pub fn detect() -> Self {
-        #[cfg(target_arch = "x86_64")]
-        if x86_64::available() {
-            return Self::Avx2;
-        }
-        #[cfg(all(target_arch = "arm", any(target_feature = "dsp", rowtone_dsp)))]
-        return Self::CortexM;
-<<<<<<< HEAD
-        #[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
-        return if aarch64::has_dot_product() {
-            Self::NeonDot
-        } else {
-            Self::Neon
-        };
-        #[cfg(not(any(
-            all(target_arch = "arm", target_feature = "dsp"),
-            all(target_arch = "aarch64", target_feature = "neon")
-        )))]
-=======
-        #[cfg(not(all(target_arch = "arm", any(target_feature = "dsp", rowtone_dsp))))]
->>>>>>> 47e617f (Tell the kernels of the DSP extension where stable Rust does not; a script that holds board and host together)
-        Self::Portable
+        Self(Self::fastest())
     }
 
-    /// All kernels that this processor can run, [`Kernel::Portable`] first.
+    #[cfg(target_arch = "x86_64")]
+    fn fastest() -> Kind {
+        if x86_64::available() {
+            Kind::Avx2
+        } else {
+            Kind::Portable
+        }
+    }
+
+    #[cfg(all(target_arch = "arm", any(target_feature = "dsp", rowtone_dsp)))]
+    fn fastest() -> Kind {
+        Kind::CortexM
+    }
+
+    #[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
+    fn fastest() -> Kind {
+        if aarch64::has_dot_product() {
+            Kind::NeonDot
+        } else {
+            Kind::Neon
+        }
+    }
+
+    #[cfg(not(any(
+        target_arch = "x86_64",
+        all(target_arch = "arm", any(target_feature = "dsp", rowtone_dsp)),
+        all(target_arch = "aarch64", target_feature = "neon")
+    )))]
+    fn fastest() -> Kind {
+        Kind::Portable
+    }
+
+    /// All kernels that this processor can run, [`Kernel::PORTABLE`] first.
     pub fn all() -> impl Iterator<Item = Self> {
-        let best = Self::detect();
+        let best = Self::fastest();
         let slower = [
-            Self::Portable,
+            Kind::Portable,
             // Every processor with the dot product has the rest of NEON too.
             #[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
-            Self::Neon,
+            Kind::Neon,
         ];
         let better = (!slower.contains(&best)).then_some(best);
-        slower.into_iter().chain(better)
+        slower.into_iter().chain(better).map(Self)
     }
 
     /// Sums over 8-bit pixels. The shorter length of the two counts. |h| ≤ [`MAX_COEFFICIENT`], or the
     /// sums are unspecified (never unsafe).
     #[inline]
     pub fn sums_u8(self, pixels: &[u8], coefficients: &[i8]) -> Sums {
-        match self {
-            Self::Portable => portable::sums_u8(pixels, coefficients),
+        match self.0 {
+            Kind::Portable => portable::sums_u8(pixels, coefficients),
             #[cfg(all(target_arch = "arm", any(target_feature = "dsp", rowtone_dsp)))]
-            Self::CortexM => cortex_m::sums_u8(pixels, coefficients),
-            // SAFETY: the variant is only made by `detect`, which asked the processor for AVX2.
+            Kind::CortexM => cortex_m::sums_u8(pixels, coefficients),
+            // SAFETY: `fastest` made this kind after it asked the processor for AVX2.
             #[cfg(target_arch = "x86_64")]
-            Self::Avx2 => unsafe { x86_64::sums_u8(pixels, coefficients) },
+            Kind::Avx2 => unsafe { x86_64::sums_u8(pixels, coefficients) },
             // SAFETY: the program was compiled for processors with NEON.
             #[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
-            Self::Neon => unsafe { aarch64::sums_u8(pixels, coefficients) },
-            // SAFETY: the variant is only made by `detect`, which asked for the dot product.
+            Kind::Neon => unsafe { aarch64::sums_u8(pixels, coefficients) },
+            // SAFETY: `fastest` made this kind after it asked for the dot product.
             #[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
-            Self::NeonDot => unsafe { aarch64::sums_u8_dot(pixels, coefficients) },
+            Kind::NeonDot => unsafe { aarch64::sums_u8_dot(pixels, coefficients) },
         }
     }
 
     /// Sums over 16-bit pixels, as [`Kernel::sums_u8`].
     #[inline]
     pub fn sums_u16(self, pixels: &[u16], coefficients: &[i8]) -> Sums {
-        match self {
-            Self::Portable => portable::sums_u16(pixels, coefficients),
+        match self.0 {
+            Kind::Portable => portable::sums_u16(pixels, coefficients),
             // Deeper pixels come from larger boards: plain Rust serves.
             #[cfg(all(target_arch = "arm", any(target_feature = "dsp", rowtone_dsp)))]
-            Self::CortexM => portable::sums_u16(pixels, coefficients),
-            // SAFETY: the variant is only made by `detect`, which asked the processor for AVX2.
+            Kind::CortexM => portable::sums_u16(pixels, coefficients),
+            // SAFETY: as for `sums_u8`.
             #[cfg(target_arch = "x86_64")]
-            Self::Avx2 => unsafe { x86_64::sums_u16(pixels, coefficients) },
-            // SAFETY: the program was compiled for processors with NEON.
+            Kind::Avx2 => unsafe { x86_64::sums_u16(pixels, coefficients) },
+            // SAFETY: as for `sums_u8`.
             #[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
-            Self::Neon | Self::NeonDot => unsafe { aarch64::sums_u16(pixels, coefficients) },
+            Kind::Neon | Kind::NeonDot => unsafe { aarch64::sums_u16(pixels, coefficients) },
         }
     }
 }
