@@ -19,11 +19,13 @@ if ! ls "$(rustc --print sysroot)"/lib/rustlib/thumbv8m.main-none-eabihf/lib/lib
         || { apt-get update -qq && apt-get install -y -qq --no-install-recommends rustc-web cargo-web rust-web-src lld >/dev/null; }
 fi
 
+cargo test --locked -p rowtone-pico2 -p rowtone-mps2-an505
+cargo clippy --locked -p rowtone-pico2 -p rowtone-mps2-an505 --all-targets -- -D warnings
+
+tools/embedded-cargo.sh build --profile firmware -p rowtone-pico2 --features bus-1bit --bin rowtone-pico2
 for package in rowtone-pico2 rowtone-mps2-an505; do
     tools/embedded-cargo.sh build --profile firmware -p "$package" --bin "$package"
 done
-tools/embedded-cargo.sh build --profile firmware -p rowtone-pico2 --features bus-1bit --bin rowtone-pico2 \
-    --target-dir "${CARGO_TARGET_DIR:-target}/bus-1bit"
 
 echo "| firmware | flash, bytes | allowed | static RAM, bytes | allowed | allocator |"
 echo "| --- | --- | --- | --- | --- | --- |"
