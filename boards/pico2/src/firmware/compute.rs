@@ -53,12 +53,13 @@ pub(crate) fn set_up(
         .ok()
         .and_then(|timing| Group::new(timing, 4).ok());
     let group = group.expect("a group of the default timing");
-    let collector = Collector::new(&config, group, storage.collected)
-        .ok()
-        .expect("room to collect");
-    let reporter = Reporter::new(config, group, storage.estimator)
-        .ok()
-        .expect("room to compute");
+    // Not `expect`: it would bring in the printing of every error, reals and all, which is 12 KiB.
+    let Ok(collector) = Collector::new(&config, group, storage.collected) else {
+        panic!("no room to collect")
+    };
+    let Ok(reporter) = Reporter::new(config, group, storage.estimator) else {
+        panic!("no room to compute")
+    };
     (collector, REPORTER.init(reporter))
 }
 
