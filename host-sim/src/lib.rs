@@ -11,6 +11,7 @@
 //! - [`output`]: reports, displacements and pictures; [`serial`]: serial ports;
 //! - [`calibrate`]: what a flashing light tells about a camera; [`linear`]: small linear algebra;
 //! - [`spectrum_scenes`]: random displacement samples with known tones, for the spectrum's figures;
+//! - [`restore`]: gaps filled, for the ear; [`methods`]: the thesis's methods and others, to compare with;
 //! - [`commands`]: one file a command, each with its options and what it does;
 //! - [`failure`]: what every command says, and exits with, when it cannot go on.
 //! - [`line`] follows a port that comes and goes, and [`receiver`] understands what it says; [`gateway`]:
@@ -25,8 +26,10 @@ pub mod input;
 pub mod line;
 pub mod linear;
 pub mod memory;
+pub mod methods;
 pub mod output;
 pub mod receiver;
+pub mod restore;
 pub mod ring;
 pub mod serial;
 pub mod sim;

@@ -22,6 +22,7 @@
 //! | [`vibration`] | a steady machine tone instead of a light |
 //! | [`plot`] | the stripes and the fit, drawn |
 //! | [`file`] | the result as TOML |
+//! | [`study`] | calibrations of simulated cameras, with the truth |
 
 use std::fmt;
 
@@ -34,6 +35,7 @@ pub mod plot;
 pub mod rows;
 pub mod search;
 pub mod stripes;
+pub mod study;
 pub mod unknown;
 pub mod vibration;
 

@@ -14,8 +14,10 @@ use crate::failure::Failure;
 
 pub mod analyze;
 pub mod calibrate;
+pub mod compare;
 pub mod demo;
 pub mod displacement;
+pub mod experiments;
 pub mod gateway;
 pub mod monitor;
 pub mod simulate;
@@ -53,6 +55,10 @@ enum Command {
     Calibrate(calibrate::Args),
     /// Measures the project's own figures anew, from a seed
     Sweep(sweep::Args),
+    /// Runs every method on the same simulated clip and prints one table
+    Compare(compare::Args),
+    /// Makes the tables and sounds of docs/results.md anew
+    Experiments(experiments::Args),
 }
 
 fn run(command: &Command) -> Result<(), Failure> {
@@ -65,6 +71,8 @@ fn run(command: &Command) -> Result<(), Failure> {
         Command::Simulate(args) => simulate::run(args),
         Command::Calibrate(args) => calibrate::run(args),
         Command::Sweep(args) => sweep::run(args),
+        Command::Compare(args) => compare::run(args),
+        Command::Experiments(args) => experiments::run(args),
     }
 }
 
