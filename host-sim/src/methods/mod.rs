@@ -69,6 +69,7 @@ pub trait Method {
 pub fn all() -> Vec<Box<dyn Method>> {
     let mut methods: Vec<Box<dyn Method>> = vec![
         Box::new(thesis::Thesis::default()),
+        Box::new(thesis::Thesis::coarse()),
         Box::new(steerable::VisualMicrophone),
     ];
     methods.extend(

@@ -35,9 +35,24 @@ impl Default for Thesis {
     }
 }
 
+impl Thesis {
+    /// Only the two coarse scales: a lens leaves little but noise in the fine ones, and a phase without its amplitude
+    /// counts for as much there as anywhere.
+    pub fn coarse() -> Self {
+        Self {
+            scales: 2..DIRECTIONS.len(),
+            ..Self::default()
+        }
+    }
+}
+
 impl Method for Thesis {
     fn name(&self) -> &'static str {
-        "thesis (shearlet phase)"
+        if self.scales.start == 0 {
+            "thesis, all sub-bands"
+        } else {
+            "thesis, coarse sub-bands"
+        }
     }
 
     fn shifts(&self, clip: &Clip) -> Shifts {
