@@ -338,7 +338,7 @@ impl Gateway<'_> {
     fn send(&mut self) -> io::Result<()> {
         // A birth may go with a report.
         while self.connected && self.under_way.len() + 2 <= IN_FLIGHT {
-            let Some((mark, entry)) = self.spool.next()? else {
+            let Some((mark, entry)) = self.spool.next_entry()? else {
                 break;
             };
             match &self.config.payload {

@@ -112,7 +112,7 @@ impl Spool {
         };
         text::encode(&message, &mut line).map_err(io::Error::other)?;
         self.write.write_all(line.as_bytes())?;
-        let Some((&number, length)) = self.files.iter_mut().next_back().map(|(n, l)| (n, l)) else {
+        let Some((&number, length)) = self.files.iter_mut().next_back() else {
             return Ok(());
         };
         *length += line.len() as u64;
@@ -128,7 +128,7 @@ impl Spool {
     ///
     /// # Errors
     /// The disk could not be read.
-    pub fn next(&mut self) -> io::Result<Option<(Mark, Entry)>> {
+    pub fn next_entry(&mut self) -> io::Result<Option<(Mark, Entry)>> {
         loop {
             let file = self.next.file;
             if !self
@@ -297,7 +297,7 @@ mod tests {
 
     fn numbers(spool: &mut Spool) -> Vec<u32> {
         let mut numbers = vec![];
-        while let Some((_, entry)) = spool.next().unwrap() {
+        while let Some((_, entry)) = spool.next_entry().unwrap() {
             numbers.push(entry.report.seq);
         }
         numbers
@@ -309,7 +309,7 @@ mod tests {
         let mut spool = Spool::open(dir.clone(), 1 << 30).unwrap();
         (0..10).for_each(|seq| spool.push(&entry(seq)).unwrap());
         let mut marks = vec![];
-        while let Some((mark, _)) = spool.next().unwrap() {
+        while let Some((mark, _)) = spool.next_entry().unwrap() {
             marks.push(mark);
         }
         spool.acknowledge(marks[3]);
