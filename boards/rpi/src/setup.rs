@@ -121,6 +121,7 @@ impl Setup {
             max_peaks: settings.max_peaks.into(),
             false_alarm: settings.false_alarm,
             um_per_px: settings.um_per_px,
+            ..spectrum::Config::default()
         };
         Ok(Self {
             shape,

@@ -125,7 +125,7 @@ fn offers(camera: &Camera<'_>, wish: StreamWish) -> (StreamRole, Vec<Offer>) {
             .flat_map(|f| formats.sizes(f))
             .collect();
         sizes.sort_by_key(|s| (s.width, s.height));
-        sizes.dedup();
+        sizes.dedup_by_key(|s| (s.width, s.height));
         if sizes.is_empty() {
             sizes.push(stream.get_size());
         }
@@ -328,7 +328,10 @@ fn request(configuration: &mut CameraConfiguration, mode: &Offer) -> Option<()> 
     let known: Vec<PixelFormat> = formats.pixel_formats().into_iter().collect();
     let names: Vec<String> = known
         .iter()
-        .filter(|f| formats.sizes(**f).contains(&size))
+        .filter(|f| {
+            let mut sizes = formats.sizes(**f).into_iter();
+            sizes.any(|s| (s.width, s.height) == (size.width, size.height))
+        })
         .map(ToString::to_string)
         .collect();
     let best = format::best(names.iter().map(String::as_str));
