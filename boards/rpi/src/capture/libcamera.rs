@@ -50,7 +50,8 @@ fn refused(what: &str) -> impl Fn(io::Error) -> CameraError + '_ {
 /// The cameras of this machine.
 pub struct Cameras {
     manager: Rc<RefCell<CameraManager>>,
-    tried: bool,
+    /// The last opening failed although the camera was there.
+    stuck: bool,
 }
 
 impl Cameras {
@@ -62,7 +63,7 @@ impl Cameras {
         let manager = CameraManager::new().map_err(refused("libcamera does not start"))?;
         Ok(Self {
             manager: Rc::new(RefCell::new(manager)),
-            tried: false,
+            stuck: false,
         })
     }
 
@@ -94,21 +95,22 @@ impl Cameras {
             })
     }
 
-    /// Opens, sets up and starts a camera. After a failure libcamera itself is restarted first, so that a camera
-    /// that was plugged in is seen.
+    /// Opens, sets up and starts a camera. libcamera itself sees cameras come and go; it is restarted only where a
+    /// camera that is there could not be opened the last time.
     ///
     /// # Errors
     /// [`CameraError`] when there is none, or it cannot be used as configured.
     pub fn open(&mut self, config: &Config) -> Result<Box<dyn Source>, CameraError> {
-        if std::mem::replace(&mut self.tried, true) {
+        if std::mem::take(&mut self.stuck) {
             let mut manager = self.manager.borrow_mut();
-            manager
-                .restart()
-                .map_err(refused("libcamera does not restart"))?;
+            let restarted = manager.restart();
+            restarted.map_err(refused("libcamera does not restart"))?;
         }
         let camera = self.find(config.camera.id.as_deref())?;
-        let opened = Opened::new(&camera, config)?;
-        Ok(Box::new(opened.start(config, self.manager.clone())?))
+        let opened = Opened::new(&camera, config);
+        let opened = opened.and_then(|opened| opened.start(config, self.manager.clone()));
+        self.stuck = opened.is_err();
+        Ok(Box::new(opened?))
     }
 }
 
