@@ -92,7 +92,7 @@ impl<'a> Problem<'a> {
     }
 
     /// Row, counted from the middle one.
-    fn from_centre(&self, y: usize) -> f64 {
+    fn distance_from_centre(&self, y: usize) -> f64 {
         y as f64 - 0.5 * (self.height() as f64 - 1.0)
     }
 
@@ -123,7 +123,7 @@ impl<'a> Problem<'a> {
                 for &(_, y) in &cells {
                     for (column, value) in smooth
                         .iter_mut()
-                        .zip(legendre(self.from_centre(y) / half, degree))
+                        .zip(legendre(self.distance_from_centre(y) / half, degree))
                     {
                         column.push(value);
                     }
@@ -138,7 +138,7 @@ impl<'a> Problem<'a> {
         let wave: Vec<f64> = group
             .cells
             .iter()
-            .map(|&(n, y)| model.wave(model.psi(n, self.from_centre(y))))
+            .map(|&(n, y)| model.wave(model.psi(n, self.distance_from_centre(y))))
             .collect();
         let mut columns = group.smooth.clone();
         columns.extend(group.smooth.iter().map(|c| {
@@ -197,12 +197,13 @@ impl<'a> Problem<'a> {
         let mut lines = Vec::with_capacity(group.cells.len());
         let mut explained = vec![vec![0.0; count]; solved.basis.len()];
         for (i, &(n, y)) in group.cells.iter().enumerate() {
-            let from_centre = self.from_centre(y);
+            let distance_from_centre = self.distance_from_centre(y);
             let mut line = vec![0.0; 2 + shapes];
-            let (_, slope) = model.wave_and_slopes(model.psi(n, from_centre), &mut line[2..]);
+            let (_, slope) =
+                model.wave_and_slopes(model.psi(n, distance_from_centre), &mut line[2..]);
             let gain = solved.gain[i];
             line[2..].iter_mut().for_each(|s| *s *= gain);
-            line[0] = gain * slope * from_centre;
+            line[0] = gain * slope * distance_from_centre;
             line[1] = gain * slope;
             for (sum, q) in explained.iter_mut().zip(&solved.basis) {
                 sum[0] += q[i] * line[0];
@@ -378,11 +379,12 @@ mod tests {
             .map(|n| {
                 (0..rows)
                     .map(|y| {
-                        let from_centre = y as f64 - 0.5 * (rows as f64 - 1.0);
-                        let psi =
-                            std::f64::consts::TAU * (per_row * from_centre + step * n as f64 + 0.1);
-                        80.0 + 0.02 * from_centre
-                            + (30.0 + 0.01 * from_centre) * (psi.cos() + 0.2 * (2.0 * psi).sin())
+                        let distance_from_centre = y as f64 - 0.5 * (rows as f64 - 1.0);
+                        let psi = std::f64::consts::TAU
+                            * (per_row * distance_from_centre + step * n as f64 + 0.1);
+                        80.0 + 0.02 * distance_from_centre
+                            + (30.0 + 0.01 * distance_from_centre)
+                                * (psi.cos() + 0.2 * (2.0 * psi).sin())
                     })
                     .collect()
             })

@@ -228,10 +228,10 @@ pub fn calibrate_with_stripes(
     light: Light,
 ) -> Result<(Calibration, Stripes), Refusal> {
     let switched = matches!(light, Light::Known { switched: true, .. });
-    if let Light::Known { hz, .. } | Light::Unknown { about_hz: Some(hz) } = light {
-        if !(hz.is_finite() && hz > 0.0) {
-            return Err(Refusal::LightHz { hz });
-        }
+    if let Light::Known { hz, .. } | Light::Unknown { about_hz: Some(hz) } = light
+        && !(hz.is_finite() && hz > 0.0)
+    {
+        return Err(Refusal::LightHz { hz });
     }
     let stripes = stripes::find(&recording.rows, if switched { 48 } else { 6 })?;
     let mut warnings = Vec::new();

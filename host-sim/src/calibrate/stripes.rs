@@ -71,10 +71,10 @@ pub fn find(rows: &Rows, most_harmonics: usize) -> Result<Stripes, Refusal> {
         };
         let problem = Problem::new(rows, background);
         let fit = problem.fit(&first_model(fit_rows, per_row), 8);
-        if let Some(fit) = fit.filter(|f| plausible(f, height)) {
-            if best.as_ref().is_none_or(|(b, _)| fit.rss < b.rss) {
-                best = Some((fit, background));
-            }
+        if let Some(fit) = fit.filter(|f| plausible(f, height))
+            && best.as_ref().is_none_or(|(b, _)| fit.rss < b.rss)
+        {
+            best = Some((fit, background));
         }
     }
     let (mut fit, mut background) = best.ok_or(Refusal::NoStripes)?;
@@ -256,7 +256,7 @@ fn check_fundamental(problem: &Problem<'_>, fit: &Fit, limit: usize) -> Result<(
         if per_row * height < 2.0 {
             continue;
         }
-        let kept = fit.model.harmonics.len().min(limit / divisor).min(8).max(1);
+        let kept = fit.model.harmonics.len().min(limit / divisor).clamp(1, 8);
         let mut start = fit.model.clone();
         start.harmonics.truncate(kept);
         let Some(alone) = problem.fit(&start, 4) else {

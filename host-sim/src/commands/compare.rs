@@ -189,7 +189,7 @@ mod tests {
             ghost: 0.001,
             us_per_line: 3.0,
         };
-        assert!(bars(&[score.clone()]).contains("1.50"));
+        assert!(bars(std::slice::from_ref(&score)).contains("1.50"));
         let args = Args {
             scene: Look::Bar,
             hz: 83.0,

@@ -52,6 +52,10 @@ pub struct Totals {
 
 /// Something happened.
 #[derive(Debug)]
+#[expect(
+    clippy::large_enum_variant,
+    reason = "reports are what comes; the rest is rare"
+)]
 enum Input {
     /// A report of a board.
     Report(Entry),

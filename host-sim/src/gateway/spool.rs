@@ -131,10 +131,10 @@ impl Spool {
     pub fn next_entry(&mut self) -> io::Result<Option<(Mark, Entry)>> {
         loop {
             let file = self.next.file;
-            if !self
+            if self
                 .reader
                 .as_ref()
-                .is_some_and(|(number, _)| *number == file)
+                .is_none_or(|(number, _)| *number != file)
             {
                 self.reader = None;
                 if self.files.contains_key(&file) {
