@@ -155,7 +155,7 @@ fn watch(source: &mut dyn Source, frames: u32, hold: Duration) {
                 frame.sequence
             );
             assert!(
-                value >= grey_of(0) && (value - grey_of(0)) % 4 == 0,
+                value >= grey_of(0) && (value - grey_of(0)).is_multiple_of(4),
                 "{value}"
             );
             if let Some((sequence, before)) = last {

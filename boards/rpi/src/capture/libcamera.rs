@@ -338,7 +338,6 @@ fn request(configuration: &mut CameraConfiguration, mode: &Offer) -> Option<()> 
         .collect();
     let best = format::best(names.iter().map(String::as_str));
     let best = best.and_then(|best| known.iter().find(|f| f.to_string() == best).copied());
-    drop(formats);
     if let Some(best) = best {
         stream.set_pixel_format(best);
     }
