@@ -19,7 +19,7 @@
 //!
 //! - [`camera`]: [`camera::Timing`] (line time, exposure, rows) and [`camera::Line`], a row with its time.
 //! - [`band`]: the reduced horizontal shearlet band, as the derivative filter that is needed of it.
-//! - [`reference`]: from a reference row to the coefficients of its inner product.
+//! - [`mod@reference`]: from a reference row to the coefficients of its inner product.
 //! - [`kernel`]: the inner product, for each processor; the only unsafe code.
 //! - [`noise`]: the noise of a pixel, measured while learning.
 //! - [`tracker`]: learns the reference, finds each line's shift, knows when it is lost.

@@ -14,7 +14,7 @@
 //! - [`restore`]: gaps filled, for the ear; [`methods`]: the thesis's methods and others, to compare with;
 //! - [`commands`]: one file a command, each with its options and what it does;
 //! - [`failure`]: what every command says, and exits with, when it cannot go on.
-//! - [`line`] follows a port that comes and goes, and [`receiver`] understands what it says; [`gateway`]:
+//! - [`mod@line`] follows a port that comes and goes, and [`receiver`] understands what it says; [`gateway`]:
 //!   many lines to an MQTT broker.
 
 pub mod analysis;

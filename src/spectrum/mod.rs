@@ -1,6 +1,6 @@
 //! Samples of one window to tones, by a joint weighted fit on the samples that exist.
 //!
-//! Contract: [`Estimator::load`] takes a window (line side's memory is free again), [`Estimator::tones`] fits it and
+//! Contract: `Estimator::load` takes a window (line side's memory is free again), [`Estimator::tones`] fits it and
 //! gives every tone that is above the false-alarm level with its standard deviations. Nothing is allocated; all memory
 //! is lent ([`EstimatorStorage`]). No input makes it panic.
 //!

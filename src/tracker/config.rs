@@ -4,7 +4,7 @@ use super::{ColumnLearning, RowLearning};
 use crate::{band::Level, camera::Timing, kernel::Kernel, reference::RowTable};
 use core::fmt;
 
-/// How a tracker is to work. Plain data, checked by [`Tracker::new`].
+/// How a tracker is to work. Plain data, checked by [`Tracker::new`](super::Tracker::new).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Config {
     /// When rows are exposed.

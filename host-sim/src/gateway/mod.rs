@@ -3,8 +3,8 @@
 //! Each line has a thread that hears its reports and asks for those that are missing. Every report
 //! goes to disk ([`spool`]) before it is sent, and leaves it when the broker has acknowledged it
 //! (QoS 1), so neither a broker that is away nor a gateway that is killed loses any. One loop
-//! ([`Gateway`]) owns the spool and the connection ([`broker`]) and takes all that happens as
-//! [`Input`]s. `docs/gateway.md` is for whoever sets it up.
+//! (`Gateway`) owns the spool and the connection (`broker`) and takes all that happens as
+//! `Input`s. `docs/gateway.md` is for whoever sets it up.
 
 mod broker;
 mod config;

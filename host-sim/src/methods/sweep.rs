@@ -15,7 +15,7 @@ use rowtone::camera::Timing;
 pub struct Line {
     /// True frequency, Hz.
     pub hz: f64,
-    /// Errors of [`methods`], in their order.
+    /// Errors of `methods`, in their order.
     pub errors_hz: Vec<Option<f64>>,
 }
 
