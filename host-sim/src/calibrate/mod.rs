@@ -21,7 +21,7 @@
 //! | [`unknown`] | a light of unknown frequency |
 //! | [`vibration`] | a steady machine tone instead of a light |
 //! | [`plot`] | the stripes and the fit, drawn |
-//! | [`file`] | the result as TOML |
+//! | [`mod@file`] | the result as TOML |
 //! | [`study`] | calibrations of simulated cameras, with the truth |
 
 use std::fmt;

@@ -16,7 +16,7 @@ use crate::input::{Frame, Rect};
 /// Frames that are looked at.
 const FRAMES: usize = 16;
 /// Fewer frames tell nothing.
-const LEAST_FRAMES: usize = 5;
+const LEAST_FRAMES: usize = 12;
 /// Rows that are taken together: a vibration hardly moves while they are read.
 const GROUP: usize = 8;
 /// Tiles along a line and across lines, and the least width of one, px.
