@@ -22,6 +22,9 @@ impl Flicker {
     /// The light does not change faster than this from row to row: what does is something else.
     const STEEPEST: f32 = 0.05;
 
+    /// A steady light must leave the times as they are.
+    const LEAST_NS: i64 = 1000;
+
     pub(super) fn begin_frame(&mut self) {
         self.before = None;
         self.share = 1.0;
@@ -41,9 +44,15 @@ impl Flicker {
         self.before = Some(to_reference);
     }
 
-    /// How much later than its middle the exposure's mean time is, ns.
+    /// How much later than its middle the exposure's mean time is, ns; 0 for less than the pixels' noise
+    /// may feign.
     #[inline]
     pub(super) fn delay_ns(&self, ns_per_slope: f32) -> i64 {
-        (self.slope * ns_per_slope) as i64
+        let delay_ns = (self.slope * ns_per_slope) as i64;
+        if delay_ns.abs() < Self::LEAST_NS {
+            0
+        } else {
+            delay_ns
+        }
     }
 }
