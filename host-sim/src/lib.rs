@@ -10,6 +10,7 @@
 //! - [`analysis`]: displacements to reports, in the memory that [`memory`] lends;
 //! - [`output`]: reports, displacements and pictures; [`serial`]: serial ports;
 //! - [`calibrate`]: what a flashing light tells about a camera; [`linear`]: small linear algebra;
+//! - [`line_scenes`]: recordings with known motion through the tracker, for the line engine's figures;
 //! - [`spectrum_scenes`]: random displacement samples with known tones, for the spectrum's figures;
 //! - [`restore`]: gaps filled, for the ear; [`methods`]: the thesis's methods and others, to compare with;
 //! - [`commands`]: one file a command, each with its options and what it does;
@@ -24,6 +25,7 @@ pub mod failure;
 pub mod gateway;
 pub mod input;
 pub mod line;
+pub mod line_scenes;
 pub mod linear;
 pub mod memory;
 pub mod methods;

@@ -3,6 +3,7 @@
 use std::io::Write;
 
 use crate::failure::Failure;
+use crate::line_scenes::{case, table as line_table};
 use crate::spectrum_scenes::score::Score;
 use crate::spectrum_scenes::table;
 
@@ -20,6 +21,26 @@ pub struct Args {
 enum What {
     /// Random displacement samples with known tones: what is found, what is not there, errors over their bounds
     Spectrum(Spectrum),
+    /// Simulated recordings through the line engine: noise over the bound, amplitude, what it invents
+    Lines(Lines),
+}
+
+/// Options of `rowtone sweep lines`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Columns: noise of a row over its Cramér–Rao bound (median over rows); error of the amplitude; largest peak
+that is no tone against the largest tone; tones found; what is left of the camera's shake; lines without
+texture; lines flagged as disturbed; how often the reference was learned anew.
+
+Example:
+  rowtone sweep lines --quick")]
+struct Lines {
+    /// A part of each picture, and fewer frames
+    #[arg(long)]
+    quick: bool,
+    /// Which series of recordings
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
 }
 
 /// Options of `rowtone sweep spectrum`.
@@ -44,7 +65,27 @@ struct Spectrum {
 /// # Errors
 /// [`Failure::OutputClosed`] when nobody reads standard output any more.
 pub fn run(args: &Args) -> Result<(), Failure> {
-    let What::Spectrum(options) = &args.what;
+    match &args.what {
+        What::Spectrum(options) => spectrum(options),
+        What::Lines(options) => lines(options),
+    }
+}
+
+fn lines(options: &Lines) -> Result<(), Failure> {
+    let (rows, frames) = if options.quick { (32, 12) } else { (96, 40) };
+    let mut cases = case::small_motion(options.seed, rows, frames);
+    cases.extend(case::hard(options.seed));
+    cases.push(case::shaking(options.seed));
+    let mut out = std::io::stdout().lock();
+    let failed = |error| Failure::writing("standard output", &error);
+    writeln!(out, "{}", line_table::head()).map_err(failed)?;
+    for case in cases {
+        writeln!(out, "{}", line_table::row(&case)).map_err(failed)?;
+    }
+    Ok(())
+}
+
+fn spectrum(options: &Spectrum) -> Result<(), Failure> {
     let mut out = std::io::stdout().lock();
     let failed = |error| Failure::writing("standard output", &error);
     writeln!(out, "{}", table::head()).map_err(failed)?;

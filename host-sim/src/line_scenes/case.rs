@@ -1,0 +1,185 @@
+//! Which recordings are measured.
+
+use crate::sim::{Config, Flicker, Hand, Motion, Optics, Preset, Scene, Step, Tone};
+
+/// One recording, and how its tracker is set.
+#[derive(Clone, Debug)]
+pub struct Case {
+    /// In words.
+    pub name: String,
+    /// The recording.
+    pub config: Config,
+    /// Frames in each of the two rounds of learning; none of them is measured.
+    pub learn_frames: u16,
+    /// Frequency up to which peaks are looked for, Hz.
+    pub max_hz: f32,
+    /// Rows count from this time on, s.
+    pub measured_from_s: f64,
+    /// Peaks are looked for too.
+    pub peaks: bool,
+}
+
+/// The scenes of the figures.
+fn scenes() -> [(&'static str, Scene); 4] {
+    [
+        ("speckle", Scene::Speckle { grain_px: 2.0 }),
+        ("bar", Scene::Bar { width_px: 30.0 }),
+        ("stripes", Scene::Stripes { period_px: 16.0 }),
+        ("photo", Scene::Photo { sky: 0.2 }),
+    ]
+}
+
+fn tone(hz: f64, amplitude_px: f64) -> Tone {
+    Tone {
+        hz,
+        amplitude_px,
+        phase_rad: 0.4,
+    }
+}
+
+fn lens() -> Optics {
+    Optics {
+        blur_px: Optics::blur_for_cutoff(0.1),
+        ..Config::default().optics
+    }
+}
+
+/// Every preset with every scene, `rows` rows of its full width, a tone of 0.3 px, 20 frames of learning and
+/// `frames` more.
+pub fn small_motion(seed: u64, rows: u32, frames: u32) -> Vec<Case> {
+    let mut cases = Vec::new();
+    for preset in Preset::ALL {
+        for (name, scene) in scenes() {
+            let mut sensor = preset.sensor();
+            sensor.rows = rows;
+            let hz = 0.37 * sensor.fps;
+            cases.push(Case {
+                name: format!("{preset} {name}"),
+                config: Config {
+                    seed,
+                    sensor,
+                    frames: 20 + frames,
+                    scene,
+                    optics: lens(),
+                    motion: Motion {
+                        tones: vec![tone(hz, 0.3)],
+                        ..Motion::default()
+                    },
+                    ..Config::default()
+                },
+                learn_frames: 10,
+                max_hz: 1000.0,
+                measured_from_s: 0.0,
+                peaks: false,
+            });
+        }
+    }
+    cases
+}
+
+/// 256 x 300 px of speckle at 60 frames a second, exposed for 0.2 ms, `seconds` after 20 frames of learning.
+fn usual(seed: u64, name: &str, tones: Vec<Tone>, seconds: f64) -> Case {
+    let mut config = Config {
+        seed,
+        scene: Scene::Speckle { grain_px: 2.0 },
+        optics: lens(),
+        ..Config::default()
+    };
+    config.sensor.cols = 256;
+    config.sensor.exposure_ns = 200_000;
+    config.frames = 20 + (seconds * config.sensor.fps).ceil() as u32 + 2;
+    config.motion.tones = tones;
+    Case {
+        name: name.to_owned(),
+        config,
+        learn_frames: 10,
+        max_hz: 2500.0,
+        measured_from_s: 0.0,
+        peaks: true,
+    }
+}
+
+/// What an estimator may be fooled by.
+pub fn hard(seed: u64) -> Vec<Case> {
+    let mut cases = Vec::new();
+    for hz in [5.3, 50.3, 203.7, 1003.0] {
+        let name = format!("8 px p-p at {hz} Hz + 0.03 px");
+        let tones = vec![tone(hz, 4.0), tone(77.7, 0.03)];
+        cases.push(usual(seed, &name, tones, 1.0));
+    }
+    for (name, scene) in scenes() {
+        let name = format!("8 px p-p at 50.3 Hz, {name}");
+        let mut case = usual(seed, &name, vec![tone(50.3, 4.0)], 1.0);
+        case.config.scene = scene;
+        cases.push(case);
+    }
+    cases.push(usual(
+        seed,
+        "30 px p-p at 20.3 Hz",
+        vec![tone(20.3, 15.0)],
+        1.0,
+    ));
+    let vibration = || vec![tone(37.3, 0.3)];
+    let mut with = |name: &str, seconds: f64, change: &dyn Fn(&mut Case)| {
+        let mut case = usual(seed, name, vibration(), seconds);
+        change(&mut case);
+        cases.push(case);
+    };
+    with("0.6 px p-p at 37.3 Hz, nothing else", 1.0, &|_| ());
+    for hz in [100.0, 120.0] {
+        with(&format!("flicker 30 % at {hz} Hz"), 1.0, &|c| {
+            c.config.light.flicker = Some(Flicker {
+                depth: 0.3,
+                hz,
+                phase_rad: 1.0,
+            });
+        });
+    }
+    let steps = |values: [f64; 3]| -> Vec<Step> {
+        [0.5, 0.75, 1.0]
+            .into_iter()
+            .zip(values)
+            .map(|(t_s, value)| Step { t_s, value })
+            .collect()
+    };
+    with("gain x 0.7, 1.3, 1", 1.0, &|c| {
+        c.config.optics.bright = 0.7;
+        c.config.disturbances.gain_steps = steps([0.7, 1.3, 1.0]);
+    });
+    with("exposure x 0.7, 1.3, 1", 1.0, &|c| {
+        c.config.optics.bright = 0.7;
+        c.config.disturbances.exposure_steps = steps([0.7, 1.3, 1.0]);
+    });
+    with("creep of 0.5 px/s, 6 s", 6.0, &|c| {
+        c.config.motion.drift_px_per_s = 0.5;
+    });
+    with("dead columns 40, 100, 101", 1.0, &|c| {
+        c.config.disturbances.dead_cols = vec![40, 100, 101];
+    });
+    with("30 white, 30 black rows", 1.0, &|c| {
+        c.config.disturbances.saturated_rows = (50..80).collect();
+        c.config.disturbances.black_rows = (150..180).collect();
+    });
+    with("hand for 0.4 s, then 1 s more", 2.0, &|c| {
+        c.config.disturbances.hand = Some(Hand {
+            start_s: 0.7,
+            duration_s: 0.4,
+            width_px: 120.0,
+            level: 0.4,
+        });
+        c.measured_from_s = 1.3;
+    });
+    with("another scene at 0.7 s", 4.0, &|c| {
+        c.config.disturbances.scene_change_s = Some(0.7);
+        c.measured_from_s = 3.3;
+    });
+    cases
+}
+
+/// The camera shakes, and its 64 leftmost columns show a background that does not move with the machine.
+pub fn shaking(seed: u64) -> Case {
+    let mut case = usual(seed, "shake 0.5 px, background", vec![tone(61.3, 0.2)], 1.0);
+    case.config.background_cols = 64;
+    case.config.shake.tones = vec![tone(12.1, 0.5), tone(31.7, 0.2)];
+    case
+}
