@@ -206,7 +206,7 @@ mod tests {
     fn the_expected_kernel_is_chosen() {
         if let Some(expected) = std::env::var_os("ROWTONE_EXPECT_KERNEL") {
             assert_eq!(
-                std::format!("{:?}", Kernel::detect()),
+                std::format!("{:?}", Kernel::detect().0),
                 expected.to_string_lossy()
             );
         }
