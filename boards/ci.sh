@@ -22,6 +22,10 @@ fi
 cargo test --locked -p rowtone-pico2 -p rowtone-mps2-an505
 cargo clippy --locked -p rowtone-pico2 -p rowtone-mps2-an505 --all-targets -- -D warnings
 
+for package in rowtone-pico2 rowtone-mps2-an505; do
+    tools/embedded-cargo.sh build --locked --profile firmware -p "$package" --bin "$package"
+done
+
 echo "| firmware | flash, bytes | allowed | static RAM, bytes | allowed | allocator |"
 echo "| --- | --- | --- | --- | --- | --- |"
 boards/budget.sh pico2 "$(tools/embedded-cargo.sh --where firmware rowtone-pico2)"
