@@ -96,7 +96,7 @@ impl<'a> Collector<'a> {
         let back = self
             .newest()
             .is_some_and(|f| start_ns < f.start_ns.saturating_sub(self.window_ns));
-        if back || (new_frame && start_ns >= self.end_ns) {
+        if back || (new_frame && start_ns >= self.end_ns.saturating_sub(self.slack_ns())) {
             let complete = self.complete(self.end_ns);
             self.pending = Some(sample);
             self.advance(start_ns, back);
@@ -172,9 +172,17 @@ impl<'a> Collector<'a> {
 
     /// How many of the held frames are before `start_ns`.
     fn first_of(&self, start_ns: i64) -> usize {
+        let start_ns = start_ns.saturating_sub(self.slack_ns());
         (0..self.held)
             .take_while(|&i| self.frame(i).is_some_and(|f| f.start_ns < start_ns))
             .count()
+    }
+
+    /// How much earlier than a window a frame may begin and still be of it. A frame's start is known
+    /// through its first sample, whose weights move it, and rates are rounded to whole nanoseconds: a frame
+    /// that begins with its window must not fall out of it by either.
+    fn slack_ns(&self) -> i64 {
+        self.period_ns().unwrap_or(0) / 4
     }
 
     /// Mean time between the frames held, by their numbers.
@@ -287,5 +295,62 @@ impl<'a> Collector<'a> {
         }
         let hops = late.max(0) / self.hop_ns + 1;
         self.end_ns = self.end_ns.saturating_add(hops.saturating_mul(self.hop_ns));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use super::super::Analyzer;
+    use super::*;
+    use crate::camera::Timing;
+    use crate::report::Report;
+    use crate::spectrum::StaticStorage;
+    use std::boxed::Box;
+    use std::vec::Vec;
+
+    /// The reports of `frames` frames at 60 fps whose starts are `early_ns(frame)` too early.
+    fn reports(frames: u32, early_ns: fn(u32) -> i64) -> Vec<Report> {
+        let group = Group::new(Timing::new(1_000_000_000, 0, 8).unwrap(), 2).unwrap();
+        let mut storage = Box::new(StaticStorage::<1024, 128, 8, 2048, 4>::new());
+        let config = Config::default();
+        let mut analyzer = Analyzer::new(config, group, storage.lend()).unwrap();
+        let mut reports = Vec::new();
+        for frame in 0..frames {
+            let start_ns = i64::from(frame) * 1_000_000_000 / 60 - early_ns(frame);
+            for slot in 0..group.slots() {
+                let complete = analyzer.push(Sample {
+                    frame,
+                    slot,
+                    time_ns: start_ns + group.middle_ns(slot),
+                    shift_px: 0.01 * ((frame * 7 + u32::from(slot) * 3) % 11) as f32,
+                    information_per_px2: 1e4,
+                });
+                if complete {
+                    reports.extend(analyzer.report());
+                }
+            }
+        }
+        reports.extend(analyzer.finish());
+        reports
+    }
+
+    #[test]
+    fn a_second_holds_sixty_frames_whatever_their_starts_round_to() {
+        let early: [fn(u32) -> i64; 5] = [
+            |_| 0,
+            |frame| i64::from(frame),
+            |frame| -i64::from(frame),
+            |frame| i64::from(frame % 3) * 2000,
+            |frame| i64::from(frame == 60) * 2000,
+        ];
+        for (case, early_ns) in early.into_iter().enumerate() {
+            let long = reports(121, early_ns);
+            assert!(long.len() >= 3, "{}", long.len());
+            for report in long {
+                assert_eq!(report.lines, 60 * 8, "case {case}, window {}", report.seq);
+            }
+            assert_eq!(reports(60, early_ns)[0].lines, 60 * 8, "case {case}");
+        }
     }
 }
