@@ -113,7 +113,7 @@ impl Tracker<'_> {
         if !self.prediction.is_sure() || self.stage != Stage::Tracking {
             return;
         }
-        let here = self.prediction.shift_px();
+        let here = self.prediction.at(0);
         self.follow.drift_px += (here - self.follow.drift_px) / DRIFT_FRAMES;
         if self.follow.drift_px.abs() < CREEP_PX {
             return;

@@ -106,7 +106,7 @@ impl Tracker<'_> {
             }
             Stage::Tracking => {}
         }
-        self.prediction = Prediction::default();
+        self.prediction.end_round();
         self.meter = NoiseMeter::default();
         self.range_px = 0.0;
         self.frames_in_stage = 0;
@@ -127,7 +127,7 @@ impl Tracker<'_> {
                     textured = true;
                     shift_px
                 }
-                Found::At { .. } | Found::NoTexture => self.prediction.shift_px(),
+                Found::At { .. } | Found::NoTexture => self.prediction.at(row),
                 Found::Disturbed => return,
             };
         }
@@ -139,7 +139,7 @@ impl Tracker<'_> {
             Stage::Refining | Stage::Tracking => seen.shift_px,
         };
         if self.prediction.is_sure() {
-            let from_centre = self.prediction.shift_px() - centre;
+            let from_centre = self.prediction.at(row) - centre;
             self.range_px = self.range_px.max(from_centre.abs());
         }
         if row.is_multiple_of(8) {

@@ -13,6 +13,7 @@ mod config;
 mod counts;
 mod flicker;
 mod follow;
+mod gap;
 mod learn;
 mod overlap;
 mod predict;
@@ -236,6 +237,8 @@ impl<'a> Tracker<'a> {
         self.frames_in_stage = self.frames_in_stage.saturating_add(1);
         self.frame = Some(frame);
         self.turn = self.turn_of(frame);
+        self.prediction
+            .begin_frame(start_ns, self.stage != Stage::Rough);
         self.watch.begin_frame(frame);
         self.flicker.begin_frame();
     }
@@ -250,7 +253,7 @@ impl<'a> Tracker<'a> {
         if information_per_px2 == 0.0 {
             return Found::NoTexture;
         }
-        let expected = self.prediction.shift_px();
+        let expected = self.prediction.at(row);
         let before = self.to_reference;
         let Some(mut shift_px) = self.correlate(row, &table, pixels, expected) else {
             return Found::NoTexture;
@@ -271,9 +274,9 @@ impl<'a> Tracker<'a> {
             }
         }
         if due && (shift_px - expected).abs() > JUMP_PX {
-            self.prediction.jump(shift_px, information_per_px2);
+            self.prediction.jump(row, shift_px, information_per_px2);
         } else {
-            self.prediction.add(shift_px, information_per_px2);
+            self.prediction.add(row, shift_px, information_per_px2);
         }
         self.flicker.add(self.to_reference);
         Found::At {

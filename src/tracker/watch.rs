@@ -15,6 +15,13 @@ const EVERY: usize = 32;
 /// Columns that are looked at, about.
 const COLUMNS: usize = 48;
 
+/// A search begins anew every so many pixels of one colour: where correlation converges from on a sharp
+/// texture too.
+const START_STEPS: i32 = 2;
+
+/// A line that leaves no more over than an error of this would, squared, is found, px².
+const WELL_PX2: f32 = 0.02;
+
 /// A scene that does not fit for so long is a new scene, ns.
 const NEW_SCENE_NS: i64 = 1_500_000_000;
 
@@ -177,33 +184,37 @@ impl Tracker<'_> {
         })
     }
 
-    /// Where over the whole range a line resembles its reference most (least squares over every second
-    /// column), px.
-    fn search<P: Pixel>(&self, row: usize, table: &RowTable, pixels: &[P]) -> Option<f32> {
-        let width = pixels.len();
-        let mean = self.storage.mean.get(row * width..)?.get(..width)?;
-        let reach = i32::from(self.config.search_px).min(width as i32 / 3);
-        let stride = usize::from(self.config.stride);
-        let line_sum: f32 = pixels.iter().map(|p| f32::from(p.value())).sum();
-        let value = line_sum / table.pixel_sum().max(1.0) / self.recipe.counts_per_value;
-        let mut best: Option<(f32, i32)> = None;
-        for whole in (-reach..=reach).step_by(stride) {
-            let overlap = Overlap::new(width, whole)?;
-            let (line, mean) = (pixels.get(overlap.line)?, mean.get(overlap.reference)?);
-            let power: f32 = line
-                .iter()
-                .zip(mean)
-                .step_by(2)
-                .map(|(&p, &r)| {
-                    let rest = f32::from(p.value()) - value * f32::from(r);
-                    rest * rest
-                })
-                .sum();
-            let power = power / line.len() as f32;
-            if best.is_none_or(|(least, _)| power < least) {
-                best = Some((power, whole));
+    /// Where a lost line resembles its reference, px: outwards from where the picture is most of the time,
+    /// so that of several places that look alike (the stripes of a periodic texture) the likeliest is
+    /// taken. From every start the line is brought to the nearest place where it correlates; a place that
+    /// leaves next to nothing over ends the search, and else one further away must leave only half.
+    fn search<P: Pixel>(&mut self, row: usize, table: &RowTable, pixels: &[P]) -> Option<f32> {
+        let middle_px = match self.stage {
+            Stage::Rough => 0.0,
+            Stage::Refining | Stage::Tracking => self.prediction.usual_px(),
+        };
+        let reach = i32::from(self.config.search_px).min(pixels.len() as i32 / 3);
+        let step = START_STEPS * i32::from(self.config.stride);
+        let well_px2 = WELL_PX2 + 2.0 * self.watch.usual_px2;
+        let mut best: Option<(f32, f32)> = None;
+        for start in (0..=reach).step_by(step as usize) {
+            for start in [start, -start] {
+                let start_px = middle_px + start as f32;
+                let Some(shift_px) = self.correlate(row, table, pixels, start_px) else {
+                    continue;
+                };
+                let Some(rest) = self.rest(row, pixels, shift_px) else {
+                    continue;
+                };
+                let left_px2 = (rest.power - 2.0).max(0.0) / rest.slope_power.max(1e-9);
+                if left_px2 < well_px2 {
+                    return Some(shift_px);
+                }
+                if best.is_none_or(|(least, _)| left_px2 < 0.5 * least) {
+                    best = Some((left_px2, shift_px));
+                }
             }
         }
-        best.map(|(_, whole)| whole as f32)
+        best.map(|(_, shift_px)| shift_px)
     }
 }
