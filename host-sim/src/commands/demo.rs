@@ -79,7 +79,7 @@ pub fn run(_args: &Args) -> Result<(), Failure> {
         exposure_us: Some(f64::from(sensor.exposure_ns) * 1e-3),
         ..CameraArgs::of("the simulated camera")
     };
-    let shifts = Shifts::start(Feed::read(&options, from, None)?)?;
+    let shifts = Shifts::start(Feed::read(&options, from)?)?;
     let settings = Settings {
         max_hz: Some(1000.0),
         ..Settings::default()

@@ -8,7 +8,8 @@ use std::fs::File;
 use std::io::{self, Read};
 
 use super::clock::Clock;
-use super::y4m::{Next, Reader};
+use super::mapped::MappedReader;
+use super::y4m::{FrameSource, Next, Reader};
 use super::{Camera, CameraArgs, Frame, Turn};
 use crate::failure::Failure;
 use crate::ring::{Inlet, Next as Arrival, Outlet, ring};
@@ -51,7 +52,7 @@ impl Feed {
     pub fn open(args: &CameraArgs) -> Result<Self, Failure> {
         args.check()?;
         if args.input == "-" {
-            return Self::read(args, io::stdin(), None);
+            return Self::read(args, io::stdin());
         }
         let cannot = |what: &str, error: &io::Error| {
             Failure::input(format!("{}: cannot be {what}: {error}", args.input))
@@ -64,34 +65,45 @@ impl Feed {
                 args.input
             )));
         }
-        let bytes = meta.is_file().then_some(meta.len());
-        Self::read(args, file, bytes)
+        if !meta.is_file() {
+            return Self::read(args, file);
+        }
+        let reader = Reader::open(file, args.name())?;
+        let behind_header = meta.len().saturating_sub(reader.header_bytes() as u64);
+        let frames = Some(behind_header / reader.stride() as u64);
+        match MappedReader::new(&reader) {
+            Ok(mapped) => Self::start(args, mapped, frames),
+            Err(_) => Self::start(args, reader, frames),
+        }
     }
 
-    /// Reads `from`, which has `bytes` bytes where that is known, instead of the input that `args` name.
+    /// Reads `from` instead of the input that `args` name.
     ///
     /// # Errors
     /// As [`Feed::open`].
-    pub fn read(
-        args: &CameraArgs,
-        from: impl Read + Send + 'static,
-        bytes: Option<u64>,
-    ) -> Result<Self, Failure> {
+    pub fn read(args: &CameraArgs, from: impl Read + Send + 'static) -> Result<Self, Failure> {
         args.check()?;
+        let reader = Reader::open(from, args.name())?;
+        Self::start(args, reader, None)
+    }
+
+    /// Starts the reading thread. `frames`: how many there are, where that is known.
+    fn start(
+        args: &CameraArgs,
+        source: impl FrameSource + Send + 'static,
+        frames: Option<u64>,
+    ) -> Result<Self, Failure> {
         let name = args.name().to_owned();
-        let reader = Reader::open(from, &name)?;
-        let clock = args.clock(reader.header())?;
-        let camera = args.camera(reader.header(), clock.fps())?;
-        let frames = bytes
-            .map(|all| all.saturating_sub(reader.header_bytes() as u64) / reader.stride() as u64);
+        let clock = args.clock(source.header())?;
+        let camera = args.camera(source.header(), clock.fps())?;
         let block = match frames {
-            Some(_) => BLOCK_BYTES / reader.stride(),
+            Some(_) => BLOCK_BYTES / source.header().luma_bytes(),
             None => 1,
         };
         let (outlet, inlet) = ring(BLOCKS, block.clamp(1, 64));
         let pts = args.pts.as_ref().map(|p| p.display().to_string());
         let thread = Reading {
-            reader,
+            source,
             clock,
             turn: camera.turn,
             name: name.clone(),
@@ -151,8 +163,8 @@ impl Feed {
 }
 
 /// The reading thread.
-struct Reading<R> {
-    reader: Reader<R>,
+struct Reading<S> {
+    source: S,
     clock: Clock,
     turn: Turn,
     name: String,
@@ -160,7 +172,7 @@ struct Reading<R> {
     frames: Option<u64>,
 }
 
-impl<R: Read> Reading<R> {
+impl<S: FrameSource> Reading<S> {
     /// Reads until the end, or until nobody listens any more.
     fn run(mut self, mut to: Outlet<Frame, Ending>) {
         for index in 0.. {
@@ -181,13 +193,13 @@ impl<R: Read> Reading<R> {
     }
 
     fn read(&mut self, index: u64, frame: &mut Frame) -> Result<Next, Failure> {
-        let next = self.reader.read_frame(&mut frame.raw)?;
+        let next = self.source.next_frame(&mut frame.raw)?;
         if let Next::Frame { luma } = next {
             self.check_times(index)?;
             if let Some((number, start_ns)) = self.clock.frame(index) {
                 (frame.number, frame.start_ns) = (number, start_ns);
             }
-            frame.prepare(self.reader.header(), luma, self.turn);
+            frame.prepare(self.source.header(), luma, self.turn);
         }
         Ok(next)
     }
@@ -217,7 +229,7 @@ impl<R: Read> Reading<R> {
     }
 
     fn truncated(&self, index: u64, have: usize, need: usize) -> String {
-        let size = self.reader.header();
+        let size = self.source.header();
         if index == 0 {
             format!(
                 "{}: not even one frame: {have} bytes where a frame of {}x{} has {need}",

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use rowtone::camera::{Line, Pixels, Timing};
 
+use super::bytes::Bytes;
 use super::{Header, Rect, Turn};
 
 /// One frame, in buffers that are used again for a later one.
@@ -14,7 +15,7 @@ pub struct Frame {
     /// Start of exposure of its first row, ns.
     pub start_ns: i64,
     /// As read: the marker, then the planes.
-    pub(super) raw: Vec<u8>,
+    pub(super) raw: Bytes,
     /// First byte of the luma plane in `raw`.
     luma: usize,
     width: usize,
@@ -101,7 +102,7 @@ mod tests {
         let mut frame = Frame {
             number: 7,
             start_ns: 100,
-            raw: b"FRAME\nabcdefghi".to_vec(),
+            raw: Bytes::Read(b"FRAME\nabcdefghi".to_vec()),
             ..Frame::default()
         };
         frame.prepare(&header, 6, Turn::No);
@@ -117,7 +118,7 @@ mod tests {
     fn deep_pixels_are_little_endian_words_and_can_be_turned() {
         let header = Header::parse(b"YUV4MPEG2 W2 H1 Cmono10").unwrap();
         let mut frame = Frame {
-            raw: b"FRAME\n\x01\x02\xff\x03".to_vec(),
+            raw: Bytes::Read(b"FRAME\n\x01\x02\xff\x03".to_vec()),
             ..Frame::default()
         };
         frame.prepare(&header, 6, Turn::No);

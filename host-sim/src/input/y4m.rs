@@ -1,104 +1,21 @@
-//! Y4M (YUV4MPEG2) files, read straight into frame buffers.
+//! Y4M (YUV4MPEG2) streams, read straight into frame buffers.
 //!
 //! [`Reader::open`] takes the header, [`Reader::read_frame`] one frame after the other. A frame is one
 //! read of the marker and the planes together, into a buffer that the caller recycles, so the pixels
 //! are copied once, by the operating system. A header that promises more than there is costs no memory:
-//! the first buffer grows as its bytes arrive.
+//! the first buffer grows as its bytes arrive. (Files on disk need no copy at all: `mapped.rs`.)
 
 use std::io::{self, Read};
 
-use super::PixelFormat;
+use super::Header;
+use super::bytes::Bytes;
+use super::header::MAGIC;
 use crate::failure::Failure;
 
-/// What every Y4M file starts with.
-const MAGIC: &[u8] = b"YUV4MPEG2";
 /// The marker in front of a frame, as nearly all writers write it (parameters may follow).
 const MARKER: &[u8] = b"FRAME\n";
 /// No header or frame marker is longer than this.
 const LONGEST_LINE: usize = 4096;
-
-/// What the header says.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Header {
-    /// Columns.
-    pub width: usize,
-    /// Rows, at most 65 535.
-    pub height: usize,
-    /// Frame rate, Hz, where the file knows one.
-    pub fps: Option<f64>,
-    /// Layout of a frame.
-    pub format: PixelFormat,
-}
-
-impl Header {
-    /// Reads the header's line, without its line feed.
-    ///
-    /// # Errors
-    /// What is wrong with it, in words.
-    pub fn parse(line: &[u8]) -> Result<Self, String> {
-        let not_y4m = || {
-            "not a Y4M file (it does not start with YUV4MPEG2): convert it, as in \
-             `ffmpeg -i FILE -f yuv4mpegpipe - | rowtone analyze -`"
-                .to_owned()
-        };
-        let text = std::str::from_utf8(line).map_err(|_| not_y4m())?;
-        let mut words = text.split(' ');
-        if words.next().map(str::as_bytes) != Some(MAGIC) {
-            return Err(not_y4m());
-        }
-        let (mut width, mut height, mut fps) = (None, None, None);
-        let mut format = PixelFormat::DEFAULT;
-        for word in words {
-            let Some(tag) = word.chars().next() else {
-                continue;
-            };
-            let value = &word[tag.len_utf8()..];
-            match tag {
-                'W' => width = value.parse::<u16>().ok(),
-                'H' => height = value.parse::<u16>().ok(),
-                'F' => fps = ratio(value),
-                'I' if matches!(value, "t" | "b" | "m") => {
-                    return Err(format!(
-                        "the video is interlaced (I{value}): its rows are out of time order; \
-                         record it progressive"
-                    ));
-                }
-                'C' => {
-                    format = PixelFormat::from_tag(value).ok_or_else(|| {
-                        format!(
-                            "the colour tag C{value} is not known: convert it with \
-                             `ffmpeg -pix_fmt gray`"
-                        )
-                    })?;
-                }
-                _ => {}
-            }
-        }
-        match (width, height) {
-            (Some(width), Some(height)) if width > 0 && height > 0 => Ok(Self {
-                width: usize::from(width),
-                height: usize::from(height),
-                fps,
-                format,
-            }),
-            _ => Err("the header gives no usable size (W and H, 1 to 65535 each)".to_owned()),
-        }
-    }
-
-    /// Bytes of the planes of one frame.
-    fn frame_bytes(&self) -> Result<usize, String> {
-        self.format
-            .frame_bytes(self.width, self.height)
-            .ok_or_else(|| "a frame is larger than this machine's memory".to_owned())
-    }
-}
-
-/// `30000:1001` as a frame rate; `0:0` and nonsense are none.
-fn ratio(text: &str) -> Option<f64> {
-    let (numerator, denominator) = text.split_once(':')?;
-    let fps = numerator.parse::<u32>().ok()? as f64 / denominator.parse::<u32>().ok()? as f64;
-    (fps.is_finite() && fps > 0.0).then_some(fps)
-}
 
 /// What came of asking for a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -119,95 +36,53 @@ pub enum Next {
     },
 }
 
-/// The frames of a Y4M stream, one after the other.
-#[derive(Debug)]
-pub struct Reader<R> {
-    from: R,
+/// Where frames come from, whatever the way.
+pub(super) trait FrameSource {
+    /// What the header says.
+    fn header(&self) -> &Header;
+
+    /// Puts the next frame, marker and all, into `bytes`.
+    ///
+    /// # Errors
+    /// As [`Reader::read_frame`].
+    fn next_frame(&mut self, bytes: &mut Bytes) -> Result<Next, Failure>;
+}
+
+/// How frames follow each other.
+#[derive(Clone, Debug)]
+pub(super) struct Layout {
     name: String,
     header: Header,
     frame_bytes: usize,
     frames: u64,
-    header_bytes: usize,
 }
 
-impl<R: Read> Reader<R> {
-    /// Reads the header. `name` stands in front of every message.
-    ///
-    /// # Errors
-    /// [`Failure::Input`] for an empty file, one that is no Y4M, and a header that cannot be used.
-    pub fn open(mut from: R, name: &str) -> Result<Self, Failure> {
-        let say = |what: String| Failure::input(format!("{name}: {what}"));
-        let line = read_line(&mut from).map_err(|e| say(format!("cannot be read: {e}")))?;
-        if line.is_empty() {
-            return Err(say("the file is empty".to_owned()));
-        }
-        let header_bytes = line.len();
-        let text = line.strip_suffix(b"\n").unwrap_or(&line);
-        let header = Header::parse(text).map_err(say)?;
-        if text.len() == line.len() {
-            return Err(say("the file ends inside its header".to_owned()));
-        }
-        let frame_bytes = header.frame_bytes().map_err(say)?;
-        Ok(Self {
-            from,
-            name: name.to_owned(),
-            header,
-            frame_bytes,
-            frames: 0,
-            header_bytes,
-        })
-    }
-
+impl Layout {
     /// What the header says.
-    pub fn header(&self) -> &Header {
+    pub(super) fn header(&self) -> &Header {
         &self.header
     }
 
-    /// Bytes of the file's header, line feed included.
-    pub fn header_bytes(&self) -> usize {
-        self.header_bytes
+    /// Bytes of the planes of a frame.
+    pub(super) fn frame_bytes(&self) -> usize {
+        self.frame_bytes
     }
 
     /// Bytes of a frame with the shortest marker.
-    pub fn stride(&self) -> usize {
+    pub(super) fn stride(&self) -> usize {
         MARKER.len() + self.frame_bytes
     }
 
-    /// Reads the next frame, marker and all, into `buffer`, which is only grown when it is too short.
-    ///
-    /// # Errors
-    /// [`Failure::Input`] when the stream cannot be read, or when there is no frame marker where one
-    /// must be, which is how a header that lies about its size shows.
-    pub fn read_frame(&mut self, buffer: &mut Vec<u8>) -> Result<Next, Failure> {
-        let stride = self.stride();
-        let have = self.fill(buffer, 0, stride)?;
-        if have == 0 {
-            return Ok(Next::End);
-        }
-        let mut have = have;
-        let mut need = stride;
-        // A marker longer than a whole (tiny) frame: its end is yet to come.
-        let marker = loop {
-            match self.check_marker(&buffer[..have])? {
-                Some(marker) => break marker,
-                None if have < need => return Ok(Next::Truncated { have, need }),
-                None => need += 1,
-            }
-            have += self.fill(buffer, have, 1)?;
-        };
-        need = self.frame_bytes + marker;
-        if have < need && have >= stride {
-            have += self.fill(buffer, have, need - have)?;
-        }
-        if have < need {
-            return Ok(Next::Truncated { have, need });
-        }
+    /// A frame was found.
+    pub(super) fn count(&mut self) {
         self.frames += 1;
-        Ok(Next::Frame { luma: marker })
     }
 
     /// Length of the marker at the start of `bytes`; `None` when the bytes end inside it.
-    fn check_marker(&self, bytes: &[u8]) -> Result<Option<usize>, Failure> {
+    ///
+    /// # Errors
+    /// [`Failure::Input`] when there is no marker, which is how a header that lies about its size shows.
+    pub(super) fn check_marker(&self, bytes: &[u8]) -> Result<Option<usize>, Failure> {
         if bytes.starts_with(MARKER) {
             return Ok(Some(MARKER.len()));
         }
@@ -231,10 +106,109 @@ impl<R: Read> Reader<R> {
         )))
     }
 
+    /// The next frame cannot be read.
+    pub(super) fn unreadable(&self, error: &io::Error) -> Failure {
+        Failure::input(format!(
+            "{}: frame {} cannot be read: {error}",
+            self.name, self.frames
+        ))
+    }
+}
+
+/// The frames of a Y4M stream, one after the other.
+#[derive(Debug)]
+pub struct Reader<R> {
+    from: R,
+    layout: Layout,
+    header_bytes: usize,
+}
+
+impl<R: Read> Reader<R> {
+    /// Reads the header. `name` stands in front of every message.
+    ///
+    /// # Errors
+    /// [`Failure::Input`] for an empty file, one that is no Y4M, and a header that cannot be used.
+    pub fn open(mut from: R, name: &str) -> Result<Self, Failure> {
+        let say = |what: String| Failure::input(format!("{name}: {what}"));
+        let line = read_line(&mut from).map_err(|e| say(format!("cannot be read: {e}")))?;
+        if line.is_empty() {
+            return Err(say("the file is empty".to_owned()));
+        }
+        let text = line.strip_suffix(b"\n").unwrap_or(&line);
+        let header = Header::parse(text).map_err(say)?;
+        if text.len() == line.len() {
+            return Err(say("the file ends inside its header".to_owned()));
+        }
+        let layout = Layout {
+            name: name.to_owned(),
+            frame_bytes: header.frame_bytes().map_err(say)?,
+            header,
+            frames: 0,
+        };
+        Ok(Self {
+            from,
+            layout,
+            header_bytes: line.len(),
+        })
+    }
+
+    /// What the header says.
+    pub fn header(&self) -> &Header {
+        self.layout.header()
+    }
+
+    /// Bytes of the file's header, line feed included.
+    pub fn header_bytes(&self) -> usize {
+        self.header_bytes
+    }
+
+    /// Bytes of a frame with the shortest marker.
+    pub fn stride(&self) -> usize {
+        self.layout.stride()
+    }
+
+    /// Where the bytes come from, and how the frames in them follow each other.
+    pub(super) fn parts(&self) -> (&R, &Layout) {
+        (&self.from, &self.layout)
+    }
+
+    /// Reads the next frame, marker and all, into `buffer`, which is only grown when it is too short.
+    ///
+    /// # Errors
+    /// [`Failure::Input`] when the stream cannot be read, or when there is no frame marker where one
+    /// must be, which is how a header that lies about its size shows.
+    pub fn read_frame(&mut self, buffer: &mut Vec<u8>) -> Result<Next, Failure> {
+        let stride = self.stride();
+        let have = self.fill(buffer, 0, stride)?;
+        if have == 0 {
+            return Ok(Next::End);
+        }
+        let mut have = have;
+        let mut need = stride;
+        // A marker longer than a whole (tiny) frame: its end is yet to come.
+        let marker = loop {
+            match self.layout.check_marker(&buffer[..have])? {
+                Some(marker) => break marker,
+                None if have < need => return Ok(Next::Truncated { have, need }),
+                None => need += 1,
+            }
+            have += self.fill(buffer, have, 1)?;
+        };
+        need = self.layout.frame_bytes() + marker;
+        if have < need && have >= stride {
+            have += self.fill(buffer, have, need - have)?;
+        }
+        if have < need {
+            return Ok(Next::Truncated { have, need });
+        }
+        self.layout.count();
+        Ok(Next::Frame { luma: marker })
+    }
+
     /// Reads up to `count` bytes to `buffer[at..]`; fewer only at the end of the stream.
     fn fill(&mut self, buffer: &mut Vec<u8>, at: usize, count: usize) -> Result<usize, Failure> {
         let end = at + count;
-        let outcome = if buffer.len() < end && self.frames == 0 {
+        let outcome = if buffer.len() < end && self.layout.frames == 0 {
             // Nothing has shown yet that frames are this large: let the buffer grow with the bytes.
             buffer.truncate(at);
             (&mut self.from).take(count as u64).read_to_end(buffer)
@@ -242,12 +216,17 @@ impl<R: Read> Reader<R> {
             buffer.resize(end.max(buffer.len()), 0);
             read_full(&mut self.from, &mut buffer[at..end])
         };
-        outcome.map_err(|error| {
-            Failure::input(format!(
-                "{}: frame {} cannot be read: {error}",
-                self.name, self.frames
-            ))
-        })
+        outcome.map_err(|error| self.layout.unreadable(&error))
+    }
+}
+
+impl<R: Read> FrameSource for Reader<R> {
+    fn header(&self) -> &Header {
+        self.layout.header()
+    }
+
+    fn next_frame(&mut self, bytes: &mut Bytes) -> Result<Next, Failure> {
+        self.read_frame(bytes.buffer())
     }
 }
 
@@ -281,6 +260,7 @@ fn read_line(from: &mut impl Read) -> io::Result<Vec<u8>> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::PixelFormat;
     use super::*;
 
     fn open(bytes: &[u8]) -> Result<Reader<&[u8]>, Failure> {

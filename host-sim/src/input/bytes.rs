@@ -1,0 +1,45 @@
+//! The bytes of one frame, wherever they are.
+
+use std::ops::{Deref, Range};
+use std::sync::Arc;
+
+use memmap2::Mmap;
+
+/// A frame's bytes, marker and all: in memory of their own, or in a window of a file.
+#[derive(Debug)]
+pub(super) enum Bytes {
+    /// Copied here.
+    Read(Vec<u8>),
+    /// Part of a window, which stays mapped for as long as a frame holds it.
+    Mapped(Arc<Mmap>, Range<usize>),
+}
+
+impl Bytes {
+    /// A buffer to read into, that of the frame before if there was one.
+    pub(super) fn buffer(&mut self) -> &mut Vec<u8> {
+        if let Self::Mapped(..) = self {
+            *self = Self::default();
+        }
+        match self {
+            Self::Read(bytes) => bytes,
+            Self::Mapped(..) => unreachable!("replaced above"),
+        }
+    }
+}
+
+impl Default for Bytes {
+    fn default() -> Self {
+        Self::Read(Vec::new())
+    }
+}
+
+impl Deref for Bytes {
+    type Target = [u8];
+
+    fn deref(&self) -> &[u8] {
+        match self {
+            Self::Read(bytes) => bytes,
+            Self::Mapped(window, range) => &window[range.clone()],
+        }
+    }
+}
