@@ -13,6 +13,8 @@ mod cortex_m;
 mod portable;
 #[cfg(target_arch = "x86_64")]
 mod x86_64;
+#[cfg(target_arch = "x86_64")]
+mod x86_64_avx512;
 
 /// Largest magnitude of a coefficient: 2·64·255 < 2¹⁵.
 pub const MAX_COEFFICIENT: i8 = 64;
@@ -40,6 +42,9 @@ enum Kind {
     /// x86-64 with AVX2: 32 pixels a step.
     #[cfg(target_arch = "x86_64")]
     Avx2,
+    /// x86-64 with AVX-512 and VNNI: 64 pixels a step.
+    #[cfg(target_arch = "x86_64")]
+    Avx512,
     /// 64-bit Arm: 16 pixels a step.
     #[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
     Neon,
@@ -59,7 +64,10 @@ impl Kernel {
 
     #[cfg(target_arch = "x86_64")]
     fn fastest() -> Kind {
-        if x86_64::available() {
+        let features = x86_64::Features::detect();
+        if features.avx512_vnni {
+            Kind::Avx512
+        } else if features.avx2 {
             Kind::Avx2
         } else {
             Kind::Portable
@@ -93,13 +101,15 @@ impl Kernel {
     pub fn all() -> impl Iterator<Item = Self> {
         let best = Self::fastest();
         let slower = [
-            Kind::Portable,
-            // Every processor with the dot product has the rest of NEON too.
+            Some(Kind::Portable),
+            // Every processor with the dot product has the rest of NEON too, every one with AVX-512 AVX2.
             #[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
-            Kind::Neon,
+            Some(Kind::Neon),
+            #[cfg(target_arch = "x86_64")]
+            (best == Kind::Avx512).then_some(Kind::Avx2),
         ];
-        let better = (!slower.contains(&best)).then_some(best);
-        slower.into_iter().chain(better).map(Self)
+        let better = (!slower.contains(&Some(best))).then_some(best);
+        slower.into_iter().flatten().chain(better).map(Self)
     }
 
     /// Sums over 8-bit pixels. The shorter length of the two counts. |h| ≤ [`MAX_COEFFICIENT`], or the
@@ -113,6 +123,9 @@ impl Kernel {
             // SAFETY: `fastest` made this kind after it asked the processor for AVX2.
             #[cfg(target_arch = "x86_64")]
             Kind::Avx2 => unsafe { x86_64::sums_u8(pixels, coefficients) },
+            // SAFETY: `fastest` made this kind after it asked for AVX-512 F, BW, VL and VNNI.
+            #[cfg(target_arch = "x86_64")]
+            Kind::Avx512 => unsafe { x86_64_avx512::sums_u8(pixels, coefficients) },
             // SAFETY: the program was compiled for processors with NEON.
             #[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
             Kind::Neon => unsafe { aarch64::sums_u8(pixels, coefficients) },
@@ -133,6 +146,9 @@ impl Kernel {
             // SAFETY: as for `sums_u8`.
             #[cfg(target_arch = "x86_64")]
             Kind::Avx2 => unsafe { x86_64::sums_u16(pixels, coefficients) },
+            // SAFETY: as for `sums_u8`.
+            #[cfg(target_arch = "x86_64")]
+            Kind::Avx512 => unsafe { x86_64_avx512::sums_u16(pixels, coefficients) },
             // SAFETY: as for `sums_u8`.
             #[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
             Kind::Neon | Kind::NeonDot => unsafe { aarch64::sums_u16(pixels, coefficients) },
@@ -157,6 +173,15 @@ mod tests {
         })
     }
 
+    /// One after the other, in 64 bits.
+    fn exact<P: Copy + Into<i64>>(pixels: &[P], coefficients: &[i8]) -> Sums {
+        let pairs = pixels.iter().zip(coefficients);
+        Sums {
+            product: pairs.map(|(&p, &h)| p.into() * i64::from(h)).sum(),
+            pixels: pixels.iter().map(|&p| p.into() as u64).sum(),
+        }
+    }
+
     #[test]
     fn all_kernels_give_the_same_bits() {
         for n in (0..200).chain([255, 256, 257, 640, 1536, 4096, 8192, 70_001]) {
@@ -175,11 +200,7 @@ mod tests {
             let most = std::vec![-MAX_COEFFICIENT; n];
             for kernel in Kernel::all() {
                 for (p, h) in [(&p, &h), (&full, &signs), (&zero, &most), (&full, &most)] {
-                    assert_eq!(
-                        kernel.sums_u8(p, h),
-                        portable::sums_u8(p, h),
-                        "{kernel:?} {n}"
-                    );
+                    assert_eq!(kernel.sums_u8(p, h), exact(p, h), "{kernel:?} {n}");
                 }
                 for (p, h) in [
                     (&deep, &h),
@@ -187,16 +208,27 @@ mod tests {
                     (&zero_deep, &most),
                     (&full_deep, &most),
                 ] {
-                    let exact = Sums {
-                        product: p
-                            .iter()
-                            .zip(h)
-                            .map(|(&p, &h)| i64::from(p) * i64::from(h))
-                            .sum(),
-                        pixels: p.iter().map(|&p| u64::from(p)).sum(),
-                    };
-                    assert_eq!(kernel.sums_u16(p, h), exact, "{kernel:?} {n}");
+                    assert_eq!(kernel.sums_u16(p, h), exact(p, h), "{kernel:?} {n}");
                 }
+            }
+        }
+    }
+
+    proptest::proptest! {
+        /// Lines of any length that begin anywhere, with any pixels and coefficients.
+        #[test]
+        fn all_kernels_are_exact(
+            line in proptest::collection::vec((0u16.., -MAX_COEFFICIENT..=MAX_COEFFICIENT), 0..2000),
+            skip in 0usize..64,
+        ) {
+            let h: Vec<i8> = line.iter().map(|&(_, h)| h).collect();
+            let deep: Vec<u16> = line.iter().map(|&(p, _)| p).collect();
+            let bytes: Vec<u8> = deep.iter().map(|&p| p as u8).collect();
+            // Starts that are no multiple of a vector.
+            let at = skip.min(h.len());
+            for kernel in Kernel::all() {
+                proptest::prop_assert_eq!(kernel.sums_u8(&bytes[at..], &h[at..]), exact(&bytes[at..], &h[at..]));
+                proptest::prop_assert_eq!(kernel.sums_u16(&deep[at..], &h[at..]), exact(&deep[at..], &h[at..]));
             }
         }
     }

@@ -3,18 +3,34 @@
 use super::{Sums, portable};
 use core::arch::x86_64::*;
 
-/// The processor has AVX2 and the operating system keeps its registers.
-pub(super) fn available() -> bool {
-    // SAFETY of the reads: CPUID exists on every x86-64; XGETBV is run only where CPUID says so.
-    let leaf1 = __cpuid(1);
-    let (osxsave, avx) = (leaf1.ecx & (1 << 27) != 0, leaf1.ecx & (1 << 28) != 0);
-    if !osxsave || !avx || __cpuid(0).eax < 7 {
-        return false;
+/// What the processor has and the operating system keeps the registers of.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Features {
+    /// AVX2.
+    pub(super) avx2: bool,
+    /// AVX-512 F, BW, VL and VNNI.
+    pub(super) avx512_vnni: bool,
+}
+
+impl Features {
+    pub(super) fn detect() -> Self {
+        let leaf1 = __cpuid(1);
+        let (osxsave, avx) = (leaf1.ecx & (1 << 27) != 0, leaf1.ecx & (1 << 28) != 0);
+        if !osxsave || !avx || __cpuid(0).eax < 7 {
+            return Self::default();
+        }
+        // SAFETY: OSXSAVE was checked, so XGETBV exists.
+        let saved = unsafe { xgetbv() };
+        let leaf7 = __cpuid_count(7, 0);
+        let has = |register: u32, bits: &[u32]| bits.iter().all(|&bit| register & (1 << bit) != 0);
+        // XMM and YMM; then also the masks and both halves of ZMM.
+        let (avx2, zmm) = (saved & 0x06 == 0x06, saved & 0xe6 == 0xe6);
+        Self {
+            avx2: avx2 && has(leaf7.ebx, &[5]),
+            // F, BW, VL; VNNI.
+            avx512_vnni: zmm && has(leaf7.ebx, &[5, 16, 30, 31]) && has(leaf7.ecx, &[11]),
+        }
     }
-    // SAFETY: OSXSAVE was checked.
-    let saved = unsafe { xgetbv() };
-    let avx2 = __cpuid_count(7, 0).ebx & (1 << 5) != 0;
-    saved & 0b110 == 0b110 && avx2
 }
 
 #[target_feature(enable = "xsave")]
