@@ -81,6 +81,9 @@ impl<'a> Link<'a> {
     /// Takes a report of the measuring side. It gets the next number.
     pub fn push(&mut self, report: Report) {
         self.outbox.push(report);
+        if self.is_modbus() {
+            self.outbox.pass_over();
+        }
     }
 
     /// Says the status unasked, as a board does at its start.

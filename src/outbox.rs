@@ -146,6 +146,12 @@ impl<'a> Outbox<'a> {
         self.slot_of(seq)?.as_ref()
     }
 
+    /// Takes nothing as waiting any more, without dropping it: for a line on which reports are read when
+    /// the host likes. They are kept, and can be asked for by number.
+    pub fn pass_over(&mut self) {
+        self.unsent = 0;
+    }
+
     /// Asks for the reports `from` to `to`, both included, once more. Gives back the first and the
     /// last number that will really be sent: the range less what is no longer kept.
     ///

@@ -15,15 +15,13 @@ use embedded_storage::nor_flash::NorFlash;
 use serde::{Deserialize, Serialize};
 
 use super::Settings;
-use crate::wire::SettingsOrigin;
+use crate::wire::{CRC_32, SettingsOrigin};
 
 /// Bytes of a slot that are used.
 pub const SLOT_LEN: usize = 256;
 
 /// `RTS`, and the version of the content.
 const MAGIC: [u8; 4] = *b"RTS\x01";
-
-static CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
 
 /// Why settings could not be kept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -273,7 +271,7 @@ fn encode(number: u32, record: &Record) -> Option<[u8; SLOT_LEN]> {
     *write = number.to_le_bytes();
     content.copy_from_slice(&u16::try_from(length).ok()?.to_le_bytes());
     let end = length.checked_add(10)?;
-    let sum = CRC.checksum(bytes.get(..end)?);
+    let sum = CRC_32.checksum(bytes.get(..end)?);
     bytes
         .get_mut(end..end.checked_add(4)?)?
         .copy_from_slice(&sum.to_le_bytes());
@@ -287,7 +285,7 @@ fn decode(bytes: &[u8; SLOT_LEN]) -> Option<Slot> {
     let length = usize::from(u16::from_le_bytes(*length));
     let end = length.checked_add(10)?;
     let sum = bytes.get(end..)?.first_chunk::<4>()?;
-    if *magic != MAGIC || CRC.checksum(bytes.get(..end)?) != u32::from_le_bytes(*sum) {
+    if *magic != MAGIC || CRC_32.checksum(bytes.get(..end)?) != u32::from_le_bytes(*sum) {
         return None;
     }
     match postcard::take_from_bytes(content.get(..length)?) {

@@ -22,7 +22,7 @@ use cobs::{DecodeResult, DecoderState};
 use heapless::Vec;
 use postcard::ser_flavors::{Cobs, Slice, crc::CrcModifier};
 
-use super::check::{EncodeError, check_message};
+use super::check::{CRC_32, EncodeError, check_message};
 use super::message::Message;
 
 /// First byte of every frame before stuffing. It changes when the order of a message's fields does.
@@ -31,9 +31,6 @@ pub const FORMAT: u8 = 1;
 /// Longest frame, both zeros included, bytes: a report with [`crate::report::MAX_PEAKS`] peaks and
 /// every number as long as it gets.
 pub const MAX_FRAME: usize = 512;
-
-/// The same checksum as in [`super::text`].
-static CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
 
 /// Why a frame was refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -91,7 +88,7 @@ pub fn encode_to_slice<'a>(
     let full = |_| EncodeError::Full;
     let flavor = CrcModifier::new(
         Cobs::try_new(Slice::new(stuffed)).map_err(full)?,
-        CRC.digest(),
+        CRC_32.digest(),
     );
     let used = postcard::serialize_with_flavor(&(FORMAT, message), flavor).map_err(full)?;
     let end = used.len().saturating_add(1);
@@ -159,7 +156,7 @@ impl<const N: usize> Decoder<N> {
 fn decode_content(frame: &[u8]) -> Result<Message, DecodeError> {
     let (content, sum) = frame.split_last_chunk::<4>().ok_or(DecodeError::Broken)?;
     let said = u32::from_le_bytes(*sum);
-    let computed = CRC.checksum(content);
+    let computed = CRC_32.checksum(content);
     if said != computed {
         return Err(DecodeError::Checksum { said, computed });
     }

@@ -4,6 +4,9 @@ use crate::report::Report;
 
 use super::message::Message;
 
+/// CRC-32/ISO-HDLC, the checksum of every wire and of saved settings; one table (1 KiB) for all.
+pub(crate) static CRC_32: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
+
 /// Every real number on a wire is smaller than this in size.
 pub const MAX_VALUE: f32 = 1e7;
 

@@ -22,6 +22,7 @@ mod sequence;
 mod slice;
 pub mod text;
 
+pub(crate) use check::CRC_32;
 pub use check::{EncodeError, MAX_VALUE, check_report};
 pub use message::{Message, REPLY_LEN, Reply, SettingsOrigin, Status};
 pub use sequence::{Arrival, Sequence};

@@ -3,6 +3,7 @@
 use heapless::Vec;
 
 use crate::report::{Peak, Report, Warnings};
+use crate::wire::CRC_32;
 use crate::wire::message::{SettingsOrigin, Status};
 
 use super::half;
@@ -16,8 +17,18 @@ pub const PEAKS_AT: u16 = 100;
 /// Registers from one peak to the next.
 pub const PEAK_STRIDE: u16 = 20;
 
+/// Address of the CRC-32 of the report.
+///
+/// The CRC-16 of a frame misses one in 65536 of the faults that it does not find with certainty, and a
+/// report takes several frames, between which a newer one can come. This covers both: it is of
+/// [`CHECKED`] and of the registers of the peaks that are there, each as two bytes, the upper first.
+const CHECK_AT: u16 = 36;
+
+/// Registers before the peaks that the check covers: session, flags, report.
+const CHECKED: [core::ops::Range<u16>; 3] = [4..6, 8..9, 16..CHECK_AT];
+
 /// Registers before the peaks.
-const HEAD_LEN: u16 = 36;
+const HEAD_LEN: u16 = CHECK_AT + 2;
 
 /// What the input registers show.
 #[derive(Clone, Copy, Debug)]
@@ -33,7 +44,8 @@ impl State<'_> {
     pub fn register(&self, at: u16) -> Option<u16> {
         match at {
             0..16 => Some(self.status_register(at)),
-            16..HEAD_LEN => Some(self.report.map_or(0, |report| report_register(report, at))),
+            16..CHECK_AT => Some(self.report.map_or(0, |report| report_register(report, at))),
+            CHECK_AT..HEAD_LEN => Some(half(self.check(), at - CHECK_AT)),
             _ => {
                 let peak = at.checked_sub(PEAKS_AT)?;
                 let (index, at) = (peak / PEAK_STRIDE, peak % PEAK_STRIDE);
@@ -47,6 +59,13 @@ impl State<'_> {
                 Some(register.unwrap_or(0))
             }
         }
+    }
+
+    /// The CRC-32 of the report's registers, 0 where there is none.
+    fn check(&self) -> u32 {
+        let peaks = self.report.map(|report| report.peaks.len());
+        let sum = peaks.and_then(|peaks| check(peaks, |at| self.register(at)));
+        sum.unwrap_or(0)
     }
 
     fn status_register(&self, at: u16) -> u16 {
@@ -128,10 +147,23 @@ fn peak_register(peak: &Peak, um_per_px: Option<f32>, at: u16) -> u16 {
     }
 }
 
+/// The CRC-32 of registers that show a report with so many peaks, where all are there.
+fn check(peaks: usize, register: impl Fn(u16) -> Option<u16>) -> Option<u32> {
+    let len = PEAK_STRIDE.checked_mul(u16::try_from(peaks).ok()?)?;
+    let peaks = PEAKS_AT..PEAKS_AT.checked_add(len)?;
+    let mut digest = CRC_32.digest();
+    for at in CHECKED.into_iter().chain([peaks]).flatten() {
+        digest.update(&register(at)?.to_be_bytes());
+    }
+    Some(digest.finalize())
+}
+
 /// The report that these registers show: what a client does with what it read. `register` gives
 /// the register at an address, as [`State::register`] does.
 ///
-/// `None` where there is no report yet, a register is missing, or a value makes no sense.
+/// `None` where there is no report yet, a register is missing, the report's own CRC-32 is not that of
+/// its registers (a fault that a frame's CRC-16 missed, or registers of two reports), or a value makes
+/// no sense.
 pub fn decode_report(register: impl Fn(u16) -> Option<u16>) -> Option<Report> {
     let pair = |at: u16| Some((u32::from(register(at)?) << 16) | u32::from(register(at + 1)?));
     let real = |at: u16| pair(at).map(f32::from_bits);
@@ -159,6 +191,9 @@ pub fn decode_report(register: impl Fn(u16) -> Option<u16>) -> Option<Report> {
                 harmonic: (flags & 4 != 0).then_some(harmonic),
             })
             .ok()?;
+    }
+    if check(peaks.len(), &register)? != pair(CHECK_AT)? {
+        return None;
     }
     let report = Report {
         seq: pair(16)?,

@@ -27,13 +27,16 @@ pub struct FrameReader {
     too_long: bool,
     last_us: u64,
     silence_us: u64,
+    /// Length of a character.
+    character_us: u64,
 }
 
 impl FrameReader {
     /// For a line of this speed, 11 bits a character.
     pub const fn new(baud: u32) -> Self {
+        let baud = if baud == 0 { 1 } else { baud as u64 };
         let silence_us = match baud {
-            0..=19_200 => 38_500_000 / if baud == 0 { 1 } else { baud as u64 },
+            0..=19_200 => 38_500_000 / baud,
             _ => 1_750,
         };
         Self {
@@ -41,13 +44,15 @@ impl FrameReader {
             too_long: false,
             last_us: 0,
             silence_us,
+            character_us: 11_000_000 / baud,
         }
     }
 
     /// Takes a byte that came at `now_us`. A byte after a silence starts a new frame, also where
     /// the one before was never asked for.
     pub fn push(&mut self, byte: u8, now_us: u64) {
-        if self.silent(now_us) {
+        // Bytes are seen at their end, and silence is up to the next one's start.
+        if self.silent(now_us.saturating_sub(self.character_us)) {
             self.clear();
         }
         self.last_us = now_us;

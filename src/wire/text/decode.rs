@@ -7,7 +7,7 @@ use crate::wire::check::may_stand_in_reply;
 use crate::wire::message::{Message, Reply, SettingsOrigin, Status};
 
 use super::fields::{Fields, hexadecimal, integer};
-use super::{CRC, resolution};
+use super::{CRC_32, resolution};
 
 /// Why a sentence was refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -140,7 +140,7 @@ pub fn decode_line(line: &str) -> Result<Message, DecodeError> {
 fn decode_body(line: &str) -> Result<Message, DecodeError> {
     let (body, sum) = line.rsplit_once('*').ok_or(DecodeError::NoChecksum)?;
     let said = hexadecimal(sum, 8).ok_or(DecodeError::NoChecksum)?;
-    let computed = CRC.checksum(body.as_bytes());
+    let computed = CRC_32.checksum(body.as_bytes());
     if said != computed {
         return Err(DecodeError::Checksum { said, computed });
     }
@@ -254,6 +254,6 @@ fn read_reply(ok: bool, mut fields: Fields<'_>) -> Result<Reply, DecodeError> {
 /// The command in a `$RTCMD,…*hhhhhhhh` sentence, or `None` where it is not one or not intact.
 pub(crate) fn command_in_sentence(line: &str) -> Option<&str> {
     let (body, sum) = line.strip_prefix('$')?.rsplit_once('*')?;
-    let intact = hexadecimal(sum, 8)? == CRC.checksum(body.as_bytes());
+    let intact = hexadecimal(sum, 8)? == CRC_32.checksum(body.as_bytes());
     body.strip_prefix("RTCMD,").filter(|_| intact)
 }

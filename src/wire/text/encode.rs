@@ -7,7 +7,7 @@ use crate::wire::check::{EncodeError, check_message};
 use crate::wire::message::{Message, SettingsOrigin, Status};
 use crate::wire::{decimal, slice::SliceWriter};
 
-use super::{CRC, resolution};
+use super::{CRC_32, resolution};
 
 /// Writes one message as one line, its `\r\n` included: at most [`super::MAX_LINE`] bytes.
 ///
@@ -36,7 +36,7 @@ fn sentence(message: &Message, out: &mut impl Write) -> fmt::Result {
     out.write_char('$')?;
     let mut body = Summed {
         out,
-        digest: CRC.digest(),
+        digest: CRC_32.digest(),
     };
     match message {
         Message::Report { session, report } => write_report(*session, report, &mut body)?,
@@ -137,7 +137,7 @@ pub fn encode_command(command: &str, out: &mut impl Write) -> fmt::Result {
     out.write_char('$')?;
     let mut body = Summed {
         out,
-        digest: CRC.digest(),
+        digest: CRC_32.digest(),
     };
     write!(body, "RTCMD,{command}")?;
     let sum = body.digest.finalize();

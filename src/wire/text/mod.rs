@@ -33,6 +33,7 @@ mod decode;
 mod encode;
 mod fields;
 
+use super::check::CRC_32;
 pub(crate) use decode::command_in_sentence;
 pub use decode::{DecodeError, Decoder, decode_line};
 pub use encode::{encode, encode_command, encode_to_slice};
@@ -56,6 +57,3 @@ pub mod resolution {
 /// Longest line, its line end included, bytes: a report with [`crate::report::MAX_PEAKS`] peaks
 /// and every number as long as it gets.
 pub const MAX_LINE: usize = 1536;
-
-/// The checksum of a sentence.
-static CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);

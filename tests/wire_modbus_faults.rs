@@ -1,0 +1,454 @@
+//! Modbus on a line that harms it: a board's end against another project's client (rmodbus).
+//!
+//! The long run, 10⁷ harmed answers and 10⁷ harmed requests (some minutes):
+//! `cargo test --release --test wire_modbus_faults -- --ignored --nocapture`
+//!
+//! Modbus prescribes a CRC-16. It finds every burst of up to 16 bits, every odd number of turned bits and any
+//! two; of all other faults it misses one in 65536, and a client that reads one register has nothing else.
+//! A report has a CRC-32 of its own (input register 36), so a wrong *report* takes a fault that both miss.
+//! What a harmed request changes has only the CRC-16 and the check of the settings as a whole before it.
+
+mod wire_common;
+
+use std::time::Instant;
+
+use rmodbus::{ModbusProto, client::ModbusRequest};
+use rowtone::link::Link;
+use rowtone::outbox::Outbox;
+use rowtone::report::Report;
+use rowtone::settings::store::{Nowhere, Started};
+use rowtone::settings::{Board, Console, Limits, Settings, Wire};
+use rowtone::wire::SettingsOrigin;
+use rowtone::wire::modbus::decode_report;
+use wire_common::{Dice, harm, ordinary_report};
+
+const UNIT: u8 = 9;
+
+/// Bytes harmed, of all bytes.
+const RATES: [f64; 4] = [1e-5, 1e-4, 1e-3, 1e-2];
+
+/// Long enough a silence at any speed used here, µs.
+const SILENCE_US: u64 = 10_000;
+
+/// A board's end of a line, and the time.
+struct Server<'a> {
+    link: Link<'a>,
+    now_us: u64,
+    byte_us: u64,
+}
+
+impl<'a> Server<'a> {
+    fn new(slots: &'a mut [Option<Report>], baud: u32) -> Self {
+        let limits = Limits {
+            width: 320,
+            height: 240,
+            min_width: 16,
+            max_window_s: 10.0,
+        };
+        let defaults = Settings {
+            unit: UNIT,
+            wire: Wire::Modbus,
+            ..Settings::default()
+        };
+        let board = Board {
+            version: [1, 2, 3],
+            limits,
+            defaults,
+        };
+        let started = Started {
+            session: 7,
+            settings: None,
+            origin: SettingsOrigin::Defaults,
+        };
+        Self {
+            link: Link::new(
+                Console::new(board, started).unwrap(),
+                Outbox::new(slots),
+                baud,
+            ),
+            now_us: 0,
+            byte_us: 11_000_000 / u64::from(baud),
+        }
+    }
+
+    fn hear(&mut self, bytes: &[u8]) {
+        for &byte in bytes {
+            self.now_us += self.byte_us;
+            self.link.receive(byte, self.now_us, &mut Nowhere);
+        }
+    }
+
+    /// What the board says after a pause.
+    fn after(&mut self, pause_us: u64) -> Vec<u8> {
+        self.now_us += pause_us;
+        let said = self.link.poll(self.now_us, &mut Nowhere).to_vec();
+        self.link.sent(said.len());
+        said
+    }
+
+    fn ask(&mut self, request: &[u8]) -> Vec<u8> {
+        self.hear(request);
+        self.after(SILENCE_US)
+    }
+
+    fn settings(&self) -> Settings {
+        *self.link.console().settings()
+    }
+}
+
+fn client() -> ModbusRequest {
+    ModbusRequest::new(UNIT, ModbusProto::Rtu)
+}
+
+/// A request of the client, and the client that takes its answer.
+fn request(of: impl FnOnce(&mut ModbusRequest, &mut Vec<u8>)) -> (ModbusRequest, Vec<u8>) {
+    let (mut client, mut frame) = (client(), vec![]);
+    of(&mut client, &mut frame);
+    (client, frame)
+}
+
+fn read_inputs(at: u16, count: u16) -> (ModbusRequest, Vec<u8>) {
+    request(|client, frame| client.generate_get_inputs(at, count, frame).unwrap())
+}
+
+fn read_holdings() -> (ModbusRequest, Vec<u8>) {
+    request(|client, frame| client.generate_get_holdings(0, 20, frame).unwrap())
+}
+
+/// The registers in an answer, if the client accepts it and they are as many as were asked for.
+fn registers(client: &ModbusRequest, answer: &[u8], count: u16) -> Option<Vec<u16>> {
+    let mut values = vec![];
+    client.parse_u16(answer, &mut values).ok()?;
+    (values.len() == usize::from(count)).then_some(values)
+}
+
+/// What a line does to a frame: bytes harmed at a rate, and at times garbage before it or the cable
+/// pulled in the middle. At least one thing happens.
+fn fault(dice: &mut Dice, frame: &[u8], rate: f64) -> Vec<u8> {
+    let mut received = vec![];
+    match dice.below(16) {
+        0 => {
+            received.extend((0..=dice.below(20)).map(|_| dice.below(256) as u8));
+            received.extend(frame);
+        }
+        1 => received.extend(&frame[..dice.below(frame.len() as u64) as usize]),
+        _ => {
+            if !harm(dice, frame, rate, &mut received) {
+                // Most frames come through a quiet line; do not wait for the others. Two faults at
+                // least, since one alone is always found.
+                for _ in 0..2 + dice.below(3) {
+                    let at = dice.below(received.len() as u64) as usize;
+                    received[at] ^= 1 << dice.below(8);
+                }
+            }
+        }
+    }
+    received
+}
+
+/// The most frames of `trials` that a CRC-16 may miss: were all faults of the kind that is not found for
+/// certain, and six standard deviations more. Fewer than one run in 10⁶ has more.
+fn most_missed(trials: u64) -> u64 {
+    let mean = trials as f64 / 65_536.0;
+    (mean + 6.0 * mean.sqrt() + 4.0) as u64
+}
+
+#[derive(Debug, Default)]
+struct Answers {
+    harmed: u64,
+    /// Accepted by the client although registers are wrong.
+    missed_by_crc16: u64,
+    /// Of these, refused by the report's CRC-32.
+    caught_by_crc32: u64,
+    wrong_reports: u64,
+}
+
+fn reports(dice: &mut Dice) -> Vec<Report> {
+    let mut real = |scale: f32| scale * (dice.below(1_000_000) as f32 / 1e6);
+    let mut reports: Vec<Report> = (0..64).map(ordinary_report).collect();
+    for (number, report) in reports.iter_mut().enumerate() {
+        report.peaks.truncate(number % 4);
+        for peak in &mut report.peaks {
+            (peak.hz, peak.amplitude_px, peak.snr_db) = (real(2000.0), real(1.0), real(80.0));
+        }
+        report.noise_px = real(0.1);
+    }
+    reports
+}
+
+/// A client reads reports in two frames, one of which is harmed.
+fn run_answers(trials: u64, seed: u64) -> Answers {
+    let mut dice = Dice::new(seed);
+    let reports = reports(&mut dice);
+    let parts = [(0, 38), (100, 80)].map(|(at, count)| (at, count, read_inputs(at, count)));
+    let intact: Vec<[Vec<u8>; 2]> = (0..reports.len())
+        .map(|number| {
+            let mut slots = [const { None }; 64];
+            let mut server = Server::new(&mut slots, 115_200);
+            reports[..=number]
+                .iter()
+                .for_each(|report| server.link.push(report.clone()));
+            parts
+                .each_ref()
+                .map(|(_, _, (_, request))| server.ask(request))
+        })
+        .collect();
+    let read = |answers: [&[u8]; 2]| -> Option<Vec<Option<u16>>> {
+        let mut map = vec![None; 420];
+        for ((at, count, (client, _)), answer) in parts.iter().zip(answers) {
+            let values = registers(client, answer, *count)?;
+            for (slot, value) in map[usize::from(*at)..].iter_mut().zip(values) {
+                *slot = Some(value);
+            }
+        }
+        Some(map)
+    };
+    let decode = |map: &[Option<u16>]| decode_report(|at| *map.get(usize::from(at))?);
+    for (answers, report) in intact.iter().zip(&reports) {
+        let map = read([&answers[0], &answers[1]]).expect("an intact answer");
+        assert_eq!(decode(&map).as_ref(), Some(report));
+    }
+
+    let mut outcome = Answers::default();
+    while outcome.harmed < trials {
+        let number = dice.below(reports.len() as u64) as usize;
+        let part = dice.below(2) as usize;
+        let rate = RATES[outcome.harmed as usize % RATES.len()];
+        let [first, second] = &intact[number];
+        let harmed = fault(&mut dice, &intact[number][part], rate);
+        outcome.harmed += 1;
+        let answers = match part {
+            0 => [&harmed, second.as_slice()],
+            _ => [first.as_slice(), &harmed],
+        };
+        let Some(map) = read(answers) else { continue };
+        if map == read([first, second]).expect("an intact answer") {
+            continue; // the fault undid itself
+        }
+        outcome.missed_by_crc16 += 1;
+        match decode(&map) {
+            None => outcome.caught_by_crc32 += 1,
+            // What was harmed is not part of a report: the uptime, say.
+            Some(report) if report == reports[number] => {}
+            Some(_) => outcome.wrong_reports += 1,
+        }
+    }
+    outcome
+}
+
+#[derive(Debug, Default)]
+struct Requests {
+    harmed: u64,
+    /// Answered although it is not what the client sent.
+    missed_by_crc16: u64,
+    /// Settings that nobody asked for.
+    wrong_settings: u64,
+    followers_lost: u64,
+}
+
+/// A board is sent harmed requests, each followed by an intact one after a silence.
+fn run_requests(trials: u64, seed: u64) -> Requests {
+    let mut dice = Dice::new(seed);
+    let mut slots = [const { None }; 4];
+    let mut server = Server::new(&mut slots, 115_200);
+    server.link.push(ordinary_report(0));
+    let (holdings_client, holdings) = read_holdings();
+    let mut outcome = Requests::default();
+    while outcome.harmed < trials {
+        let before = server.settings();
+        let mut wanted = before;
+        let (_, frame) = match dice.below(4) {
+            0 => read_inputs(dice.below(38) as u16, 1),
+            1 => read_holdings(),
+            2 => {
+                wanted.max_peaks = 1 + dice.below(16) as u8;
+                let value = u16::from(wanted.max_peaks);
+                request(|client, frame| client.generate_set_holding(4, value, frame).unwrap())
+            }
+            _ => {
+                wanted.window_s = 1.0 + dice.below(9) as f32;
+                wanted.hop_s = 0.25 * (1 + dice.below(4)) as f32;
+                let values: Vec<u16> = [wanted.window_s, wanted.hop_s]
+                    .iter()
+                    .flat_map(|value| [(value.to_bits() >> 16) as u16, value.to_bits() as u16])
+                    .collect();
+                request(|client, frame| {
+                    client
+                        .generate_set_holdings_bulk(0, &values, frame)
+                        .unwrap();
+                })
+            }
+        };
+        let rate = RATES[outcome.harmed as usize % RATES.len()];
+        let harmed = fault(&mut dice, &frame, rate);
+        outcome.harmed += 1;
+        let answered = !server.ask(&harmed).is_empty();
+        outcome.missed_by_crc16 += u64::from(answered && harmed != frame);
+        let after = server.settings();
+        if after != before && after != wanted {
+            outcome.wrong_settings += 1;
+        }
+        if after.wire != Wire::Modbus || after.unit != UNIT {
+            server.link_reset(before);
+        }
+        let heard = registers(&holdings_client, &server.ask(&holdings), 20);
+        let right = heard.is_some_and(|heard| heard[4] == u16::from(server.settings().max_peaks));
+        outcome.followers_lost += u64::from(!right);
+    }
+    outcome
+}
+
+impl Server<'_> {
+    /// What a service technician does after a wrong unit or wire was set: not part of what is counted.
+    fn link_reset(&mut self, before: Settings) {
+        for byte in format!("set wire modbus unit {}\n", before.unit).bytes() {
+            self.link.receive(byte, self.now_us, &mut Nowhere);
+        }
+        if self.settings().unit != UNIT {
+            let unit = self.settings().unit;
+            let mut client = ModbusRequest::new(unit, ModbusProto::Rtu);
+            let mut frame = vec![];
+            client
+                .generate_set_holding(6, u16::from(UNIT), &mut frame)
+                .unwrap();
+            self.ask(&frame);
+        }
+    }
+}
+
+fn check(answers: &Answers, requests: &Requests) {
+    assert_eq!(answers.wrong_reports, 0, "{answers:?}");
+    assert!(
+        answers.missed_by_crc16 <= most_missed(answers.harmed),
+        "{answers:?}"
+    );
+    assert_eq!(requests.followers_lost, 0, "{requests:?}");
+    assert!(
+        requests.missed_by_crc16 <= most_missed(requests.harmed),
+        "{requests:?}"
+    );
+}
+
+#[test]
+fn harmed_frames() {
+    check(&run_answers(20_000, 1), &run_requests(20_000, 2));
+}
+
+#[test]
+#[ignore = "takes some minutes in release"]
+fn ten_million_harmed_frames() {
+    let start = Instant::now();
+    let answers = run_answers(10_000_000, 3);
+    println!("{answers:?} in {:.0} s", start.elapsed().as_secs_f32());
+    let start = Instant::now();
+    let requests = run_requests(10_000_000, 4);
+    println!("{requests:?} in {:.0} s", start.elapsed().as_secs_f32());
+    check(&answers, &requests);
+}
+
+/// A frame ends with 3.5 characters of silence, and only there.
+#[test]
+fn silences_part_frames() {
+    for (baud, short_us, long_us) in [(115_200, 1_000, 1_800), (9600, 3_000, 4_100)] {
+        let mut slots = [const { None }; 4];
+        let mut server = Server::new(&mut slots, baud);
+        let (client, frame) = read_inputs(0, 4);
+        let right = |answer: &[u8]| registers(&client, answer, 4) == Some(vec![1, 1, 2, 3]);
+
+        server.hear(&frame);
+        assert!(
+            server.after(short_us).is_empty(),
+            "{baud}: it may go on yet"
+        );
+        assert!(right(&server.after(long_us - short_us)));
+
+        // A pause within a frame.
+        for (pause_us, answered) in [(short_us, true), (long_us, false)] {
+            server.hear(&frame[..3]);
+            assert!(server.after(pause_us).is_empty());
+            server.hear(&frame[3..]);
+            assert_eq!(right(&server.after(SILENCE_US)), answered, "{baud}");
+        }
+
+        // Garbage when the cable is plugged in: alone, and with a request right behind it.
+        server.hear(&[0, 0xff, 0x55]);
+        assert!(server.after(long_us).is_empty());
+        assert!(right(&server.ask(&frame)));
+        server.hear(&[0xff; 7]);
+        assert!(server.ask(&frame).is_empty());
+        assert!(right(&server.ask(&frame)));
+
+        // More than a frame holds, and a request cut short by the pulled cable.
+        assert!(server.ask(&[UNIT; 300]).is_empty());
+        assert!(right(&server.ask(&frame)));
+        assert!(server.ask(&frame[..5]).is_empty());
+        assert!(right(&server.ask(&frame)));
+
+        // Two requests of which the board heard the first too late to answer.
+        server.hear(&frame);
+        server.now_us += SILENCE_US;
+        assert!(right(&server.ask(&frame)));
+        assert!(server.after(SILENCE_US).is_empty());
+    }
+}
+
+/// Other units on the same two wires, and their answers.
+#[test]
+fn others_on_the_bus_do_not_matter() {
+    let mut slots = [const { None }; 4];
+    let mut server = Server::new(&mut slots, 19_200);
+    let (client, frame) = read_inputs(0, 4);
+    let mut other = ModbusRequest::new(UNIT + 1, ModbusProto::Rtu);
+    let mut to_other = vec![];
+    other.generate_get_inputs(0, 4, &mut to_other).unwrap();
+    let mut answer = vec![UNIT + 1, 4, 8, 0, 1, 0, 2, 0, 3, 0, 4];
+    let crc = crc::Crc::<u16>::new(&crc::CRC_16_MODBUS).checksum(&answer);
+    answer.extend(crc.to_le_bytes());
+    for _ in 0..3 {
+        assert!(server.ask(&to_other).is_empty());
+        assert!(server.ask(&answer).is_empty());
+        assert!(registers(&client, &server.ask(&frame), 4).is_some());
+    }
+}
+
+/// Reports that a PLC never reads are not dropped reports: the newest is what it wants.
+#[test]
+fn nothing_counts_as_dropped() {
+    let mut slots = [const { None }; 4];
+    let mut server = Server::new(&mut slots, 115_200);
+    (0..10).for_each(|seq| server.link.push(ordinary_report(seq)));
+    let (client, frame) = read_inputs(10, 8);
+    let heard = registers(&client, &server.ask(&frame), 8).unwrap();
+    // Next number 10, dropped 0, refused 0, newest 9.
+    assert_eq!(heard, [0, 10, 0, 0, 0, 0, 0, 9]);
+}
+
+/// The report's own checksum tells a fault that a frame's CRC-16 would miss, and registers of two reports.
+#[test]
+fn a_report_is_whole_or_none() {
+    let map = |seq: u32| -> Vec<Option<u16>> {
+        let mut slots = [const { None }; 4];
+        let mut server = Server::new(&mut slots, 115_200);
+        (0..=seq).for_each(|seq| server.link.push(ordinary_report(seq)));
+        let mut map = vec![None; 420];
+        for (at, count) in [(0, 38), (100, 80)] {
+            let (client, frame) = read_inputs(at, count);
+            let values = registers(&client, &server.ask(&frame), count).unwrap();
+            for (slot, value) in map[usize::from(at)..].iter_mut().zip(values) {
+                *slot = Some(value);
+            }
+        }
+        map
+    };
+    let decode = |map: &[Option<u16>]| decode_report(|at| *map.get(usize::from(at))?);
+    let map = map(3);
+    assert_eq!(decode(&map), Some(ordinary_report(3)));
+    for at in (4..6).chain([8]).chain(16..38).chain(100..160) {
+        for bit in 0..16 {
+            let mut harmed = map.clone();
+            harmed[at] = harmed[at].map(|value| value ^ 1 << bit);
+            // The third flag of a peak says that it is there; without it there are fewer peaks.
+            assert_eq!(decode(&harmed), None, "register {at}, bit {bit}");
+        }
+    }
+}
