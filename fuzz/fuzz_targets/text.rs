@@ -22,6 +22,9 @@ fuzz_target!(|data: &[u8]| {
     let Ok(body) = core::str::from_utf8(data) else { return };
     let line = format!("${body}*{sum:08X}\r\n");
     if let Ok(message) = text::decode_line(&line) {
-        assert_eq!(encoded(&message), line.as_bytes());
+        // A line with more digits than an f32 has comes back with fewer, but means the same.
+        let again = encoded(&message);
+        let again = core::str::from_utf8(&again).expect("plain text");
+        assert_eq!(text::decode_line(again), Ok(message));
     }
 });

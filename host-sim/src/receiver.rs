@@ -12,8 +12,9 @@ use rowtone::wire::{Arrival, Message, Reply, Sequence, Status, binary, text};
 
 /// How long to wait for reports that were asked for again.
 const PATIENCE: Duration = Duration::from_secs(2);
-/// How often to ask for the same reports.
-const ATTEMPTS: u32 = 3;
+/// How often to ask for the same reports: on a line that harms one byte in a thousand, a question and
+/// its answer get through three times in four.
+const ATTEMPTS: u32 = 8;
 /// Most reports to wait for; those missing beyond are lost.
 const MOST_MISSING: u32 = 1000;
 
@@ -60,6 +61,15 @@ enum Wire {
     Binary,
 }
 
+/// A request that waits for its answer.
+#[derive(Clone, Copy, Debug)]
+struct Asked {
+    at: Instant,
+    attempt: u32,
+    /// First and last number.
+    range: (u32, u32),
+}
+
 /// Listens to one line.
 #[derive(Debug, Default)]
 pub struct Receiver {
@@ -68,11 +78,19 @@ pub struct Receiver {
     wire: Option<Wire>,
     sequence: Sequence,
     missing: BTreeSet<u32>,
-    asked: Option<(Instant, u32)>,
+    asked: Option<Asked>,
     counters: Counters,
 }
 
 impl Receiver {
+    /// Goes on where another listener ended, with the session and number of its newest report.
+    pub fn after(session: u32, seq: u32) -> Self {
+        Self {
+            sequence: Sequence::after(session, seq),
+            ..Self::default()
+        }
+    }
+
     /// Takes bytes as they came, and gives `to` what they say.
     pub fn hear(&mut self, bytes: &[u8], mut to: impl FnMut(Heard)) {
         for &byte in bytes {
@@ -99,8 +117,8 @@ impl Receiver {
     /// after a while, and after some times in vain the reports count as lost.
     pub fn ask(&mut self, now: Instant) -> Option<Vec<u8>> {
         let attempt = match self.asked {
-            Some((at, _)) if now.duration_since(at) < PATIENCE => return None,
-            Some((_, attempt)) => attempt + 1,
+            Some(asked) if now.duration_since(asked.at) < PATIENCE => return None,
+            Some(asked) => asked.attempt + 1,
             None => 1,
         };
         let (first, last) = self.first_missing()?;
@@ -108,11 +126,26 @@ impl Receiver {
             self.give_up(first, last);
             return self.ask(now);
         }
-        self.asked = Some((now, attempt));
+        self.asked = Some(Asked {
+            at: now,
+            attempt,
+            range: (first, last),
+        });
         let mut line = String::new();
         // Writing to a string cannot fail.
         let _ = text::encode_command(&format!("resend {first} {last}"), &mut line);
         Some(line.into_bytes())
+    }
+
+    /// Session and number of the last report up to which none is missing: all before were heard, or
+    /// given up. [`Receiver::after`] goes on from there.
+    pub fn complete(&self) -> Option<(u32, u32)> {
+        let (session, newest) = self.sequence.newest()?;
+        let first = self.missing.first();
+        Some((
+            session,
+            first.map_or(newest, |first| first.saturating_sub(1)),
+        ))
     }
 
     /// What was counted so far. Reports still missing count as lost until they come.
@@ -127,7 +160,16 @@ impl Receiver {
         let (session, report) = match message {
             Message::Report { session, report } => (session, report),
             Message::Status(status) => return Some(Heard::Status(status)),
-            Message::Reply(reply) => return Some(Heard::Reply(reply)),
+            Message::Reply(reply) => {
+                // The board has said all that it can, so these are gone.
+                if let Some(Asked { range, .. }) = self.asked
+                    && !reply.ok
+                    && reply.text.starts_with("not kept")
+                {
+                    self.give_up(range.0, range.1);
+                }
+                return Some(Heard::Reply(reply));
+            }
         };
         let arrival = self.sequence.arrive(session, report.seq);
         match arrival {
@@ -173,9 +215,10 @@ impl Receiver {
     }
 
     fn give_up(&mut self, first: u32, last: u32) {
+        let before = self.missing.len();
         self.missing
             .retain(|number| !(first..=last).contains(number));
-        self.counters.lost += u64::from(last - first) + 1;
+        self.counters.lost += (before - self.missing.len()) as u64;
         self.asked = None;
     }
 }
@@ -190,6 +233,15 @@ mod tests {
         let mut buffer = [0; text::MAX_LINE];
         let message = Message::Report { session, report };
         text::encode_to_slice(&message, &mut buffer)
+            .unwrap()
+            .to_vec()
+    }
+
+    fn not_kept() -> Vec<u8> {
+        let text = "not kept: reports 9 to before 12 are; ask for those";
+        let text = text.try_into().unwrap();
+        let mut buffer = [0; text::MAX_LINE];
+        text::encode_to_slice(&Message::Reply(Reply { ok: false, text }), &mut buffer)
             .unwrap()
             .to_vec()
     }
@@ -211,6 +263,7 @@ mod tests {
         let at = |s| now + Duration::from_secs(s);
         let heard = [line(1, 4), line(1, 5), line(1, 9), line(1, 11)].concat();
         assert_eq!(numbers(&mut receiver, &heard), [4, 5, 9, 11]);
+        assert_eq!(receiver.complete(), Some((1, 5)));
         assert_eq!(receiver.counters().lost, 4);
         let asked = String::from_utf8(receiver.ask(at(0)).unwrap()).unwrap();
         assert!(asked.starts_with("$RTCMD,resend 6 8*"), "{asked}");
@@ -220,12 +273,17 @@ mod tests {
             numbers(&mut receiver, &[line(1, 7), line(1, 7)].concat()),
             [7]
         );
-        for seconds in [2, 5, 8] {
-            let asked = String::from_utf8(receiver.ask(at(seconds)).unwrap()).unwrap();
+        for attempt in 1..=ATTEMPTS {
+            let asked = receiver.ask(at(3 * u64::from(attempt))).unwrap();
+            let asked = String::from_utf8(asked).unwrap();
             assert!(asked.contains("resend 6 6*"), "{asked}");
         }
-        let asked = String::from_utf8(receiver.ask(at(11)).unwrap()).unwrap();
+        let asked = String::from_utf8(receiver.ask(at(50)).unwrap()).unwrap();
         assert!(asked.contains("resend 8 8*"), "{asked}");
+        // The board says that it has 8 no more; 10 is next.
+        assert!(numbers(&mut receiver, &not_kept()).is_empty());
+        let asked = String::from_utf8(receiver.ask(at(51)).unwrap()).unwrap();
+        assert!(asked.contains("resend 10 10*"), "{asked}");
         let counters = Counters {
             reports: 5,
             recovered: 1,
@@ -236,7 +294,8 @@ mod tests {
         assert_eq!(receiver.counters(), counters);
 
         assert_eq!(numbers(&mut receiver, &line(2, 0)), [0]);
-        assert_eq!(receiver.ask(at(20)), None);
+        assert_eq!(receiver.complete(), Some((2, 0)));
+        assert_eq!(receiver.ask(at(60)), None);
         assert_eq!(
             (receiver.counters().restarts, receiver.counters().lost),
             (1, 3)

@@ -40,6 +40,14 @@ pub struct Sequence {
 }
 
 impl Sequence {
+    /// Goes on where another listener ended, with the session and number of its newest report: what
+    /// was said between is missing.
+    pub const fn after(session: u32, seq: u32) -> Self {
+        Self {
+            newest: Some((session, seq)),
+        }
+    }
+
     /// Takes a report's session and number.
     pub fn arrive(&mut self, session: u32, seq: u32) -> Arrival {
         let arrival = match self.newest {

@@ -1,6 +1,6 @@
 //! A report as a JSON message.
 
-use super::spool::Entry;
+use super::entry::Entry;
 use crate::output::json;
 
 /// The object that `rowtone analyze` writes, with whose it is, its session, and when it came.

@@ -4,7 +4,7 @@
 use prost::{Message, Oneof};
 use rowtone::report::{MAX_PEAKS, Report};
 
-use super::spool::Entry;
+use super::entry::Entry;
 use crate::output::band_velocity;
 
 /// `org.eclipse.tahu.protobuf.Payload`
@@ -105,6 +105,16 @@ pub(super) fn board_data(entry: &Entry, seq: u64, historical: bool) -> Vec<u8> {
     Payload {
         timestamp: Some(entry.unix_ms),
         metrics,
+        seq: Some(seq),
+    }
+    .encode_to_vec()
+}
+
+/// A board's death: its line has gone.
+pub(super) fn board_death(seq: u64, unix_ms: u64) -> Vec<u8> {
+    Payload {
+        timestamp: Some(unix_ms),
+        metrics: vec![],
         seq: Some(seq),
     }
     .encode_to_vec()

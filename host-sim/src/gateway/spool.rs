@@ -1,39 +1,24 @@
 //! Reports on disk until the broker has them.
 //!
-//! Every report is appended to a file as one line before it is sent: when it came, which board's it
-//! is, and its `text` sentence, whose checksum also tells a line that was cut short. A cursor says
-//! up to where the broker has acknowledged; it is replaced as a whole. After a crash a few reports
-//! behind the cursor are sent once more, and a receiver drops those by board, session and number.
+//! Every report is appended to a file as one line ([`Entry`]) before it is sent. A cursor says up to
+//! where the broker has acknowledged; it is replaced as a whole. After a crash the reports behind
+//! the cursor are sent once more, and a receiver drops those it has by board, session and number.
 
 use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions};
 use std::io::{self, BufRead, BufReader, Seek, SeekFrom, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use rowtone::report::Report;
-use rowtone::wire::{Message, text};
+pub use super::entry::Entry;
 
 /// Length at which a new file is begun, bytes.
 const FILE_LEN: u64 = 1 << 20;
 
-/// One report of one board.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Entry {
-    /// When it came, ms since 1970.
-    pub unix_ms: u64,
-    /// Name of the board.
-    pub board: String,
-    /// Number of the board's session.
-    pub session: u32,
-    /// What it measured.
-    pub report: Report,
-}
-
 /// A place in the spool: behind an entry.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Mark {
-    file: u64,
-    offset: u64,
+    pub(super) file: u64,
+    pub(super) offset: u64,
 }
 
 /// The spool.
@@ -105,12 +90,7 @@ impl Spool {
     /// # Errors
     /// The disk refused it.
     pub fn push(&mut self, entry: &Entry) -> io::Result<()> {
-        let mut line = format!("{} {} ", entry.unix_ms, entry.board);
-        let message = Message::Report {
-            session: entry.session,
-            report: entry.report.clone(),
-        };
-        text::encode(&message, &mut line).map_err(io::Error::other)?;
+        let line = entry.to_line().map_err(io::Error::other)?;
         self.write.write_all(line.as_bytes())?;
         let Some((&number, length)) = self.files.iter_mut().next_back() else {
             return Ok(());
@@ -156,7 +136,7 @@ impl Spool {
                 self.next = Mark { file, offset: 0 };
                 continue;
             }
-            match parse(&line) {
+            match Entry::from_line(&line) {
                 Some(entry) => return Ok(Some((self.next, entry))),
                 // Cut short by a crash, or harmed on disk.
                 None => self.dropped += 1,
@@ -184,9 +164,7 @@ impl Spool {
             return Ok(());
         }
         let Mark { file, offset } = self.acknowledged;
-        let new = self.dir.join("cursor.new");
-        std::fs::write(&new, format!("{file} {offset}\n"))?;
-        std::fs::rename(new, self.dir.join("cursor"))?;
+        replace(&self.dir, "cursor", &format!("{file} {offset}\n"))?;
         self.saved = self.acknowledged;
         self.remove_acknowledged();
         Ok(())
@@ -248,30 +226,25 @@ impl Spool {
     }
 }
 
-fn file_path(dir: &std::path::Path, number: u64) -> PathBuf {
+/// Writes a small file as a whole: the old content or the new, whenever it is cut short.
+///
+/// # Errors
+/// The disk refused it.
+pub(super) fn replace(dir: &Path, name: &str, content: &str) -> io::Result<()> {
+    let new = dir.join(format!("{name}.new"));
+    std::fs::write(&new, content)?;
+    std::fs::rename(new, dir.join(name))
+}
+
+fn file_path(dir: &Path, number: u64) -> PathBuf {
     dir.join(format!("{number:012}.spool"))
 }
 
-fn new_file(dir: &std::path::Path, number: u64) -> io::Result<File> {
+fn new_file(dir: &Path, number: u64) -> io::Result<File> {
     OpenOptions::new()
         .append(true)
         .create_new(true)
         .open(file_path(dir, number))
-}
-
-fn parse(line: &[u8]) -> Option<Entry> {
-    let line = std::str::from_utf8(line).ok()?.strip_suffix('\n')?;
-    let (unix_ms, rest) = line.split_once(' ')?;
-    let (board, sentence) = rest.split_once(' ')?;
-    match text::decode_line(sentence).ok()? {
-        Message::Report { session, report } => Some(Entry {
-            unix_ms: unix_ms.parse().ok()?,
-            board: board.to_owned(),
-            session,
-            report,
-        }),
-        _ => None,
-    }
 }
 
 #[cfg(test)]

@@ -11,9 +11,10 @@
 //! `*`, as 8 upper-case hexadecimal digits. NMEA's own XOR of 8 bits misses one fault in 256;
 //! this one misses one in 4·10⁹ of the faults it does not catch with certainty.
 //!
-//! Reals are fixed decimals, rounded exactly ([`resolution`]). What was decoded is encoded to
-//! the same line again, and what is decoded differs from what was encoded by at most half a
-//! resolution and half an f32 step.
+//! Reals are fixed decimals, rounded exactly ([`resolution`]). What was encoded and decoded is
+//! encoded to the same line again, and what is decoded differs from what was encoded by at most
+//! half a resolution and half an f32 step. A line of another program may hold more digits than an
+//! f32 can; it is read as the nearest.
 //!
 //! ```
 //! use rowtone::wire::{Message, Reply, text};
