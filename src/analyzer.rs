@@ -36,7 +36,9 @@ use crate::timeline::{Group, Sample};
 ///         noise = noise.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
 ///         let shift_px = 0.1 * (time_ns as f64 * 1e-9 * 133.0 * std::f64::consts::TAU).cos()
 ///             + 0.01 * (f64::from(noise) / 4.3e9 - 0.5);
-///         let sample = Sample { frame, slot, time_ns, shift_px: shift_px as f32, information_per_px2: 1e5 };
+///         let sample = Sample {
+///             frame, slot, time_ns, shift_px: shift_px as f32, information_per_px2: 1e5, spread: group.even_spread(),
+///         };
 ///         assert!(!analyzer.push(sample));
 ///     }
 /// }

@@ -23,6 +23,19 @@ pub struct Displacement {
     pub information_per_px2: f32,
 }
 
+/// How the times of a sample's rows lie about their mean, weighted like the shift. Zero where it has but one row.
+///
+/// Averaging rows weakens a fast vibration, and turns its phase where they lie more to one side; a picture's
+/// rows differ in texture, so each group of rows does so in its own way, and the same way in every frame. What
+/// is not taken into account looks like ghosts a multiple of the frame rate from the vibration.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Spread {
+    /// Variance, ns².
+    pub variance_ns2: f32,
+    /// Third central moment, ns³: above 0 with few rows far behind the mean.
+    pub third_ns3: f32,
+}
+
 /// Some neighbouring rows of one frame, combined.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {
@@ -37,4 +50,6 @@ pub struct Sample {
     pub shift_px: f32,
     /// 1/variance of the shift, 1/px². Greater than 0.
     pub information_per_px2: f32,
+    /// The times of its rows about `time_ns`.
+    pub spread: Spread,
 }

@@ -4,7 +4,7 @@ use rowtone::analyzer::Analyzer;
 use rowtone::camera::Timing;
 use rowtone::report::Report;
 use rowtone::spectrum::{Config, StaticStorage};
-use rowtone::timeline::{Group, Sample};
+use rowtone::timeline::{Group, Sample, Spread};
 
 struct Draw(u64);
 
@@ -108,6 +108,10 @@ fn nothing_panics_and_all_is_finite() {
                     time_ns: start_ns.saturating_add(group.middle_ns(slot)),
                     shift_px: if strange { draw.of(&odd) } else { unit },
                     information_per_px2: if strange { draw.of(&odd) } else { 1e4 },
+                    spread: Spread {
+                        variance_ns2: if strange { draw.of(&odd) } else { 1e9 },
+                        third_ns3: if strange { draw.of(&odd) } else { 1e13 },
+                    },
                 };
                 if analyzer.push(sample) && !draw.once_in(4) {
                     let report = analyzer.report().expect("a window was ready");

@@ -130,6 +130,43 @@ fn a_run_up_is_followed() {
     assert!((squares / reports.len() as f64).sqrt() < 0.5);
 }
 
+/// Rows of a picture know very unlike: each group of them weakens and turns a fast tone in its own way, the same in
+/// every frame. Left alone that made six ghosts of up to 12 % a multiple of the frame rate from this tone.
+#[test]
+fn uneven_rows_make_no_ghosts() {
+    let timing = Timing::new(10_000_000, 0, 500).unwrap();
+    let group = Group::new(timing, rows_per_sample(timing, 2000.0, 110, 1 << 16)).unwrap();
+    let mut noise = Noise(9);
+    for _ in 0..4 {
+        noise.unit();
+    }
+    let information: Vec<f64> = (0..500).map(|_| noise.draw().exp() * 2500.0).collect();
+    let mut memory = Box::new(StaticStorage::<8192, 128, 128, 16384, 17>::new());
+    let mut analyzer = Analyzer::new(Config::default(), group, memory.lend()).unwrap();
+    let mut binner = Binner::new(group);
+    for frame in 0..110_u32 {
+        for row in 0..500_u16 {
+            let time_ns = i64::from(frame) * 9_100_000 + timing.middle_ns(row);
+            let known = information[usize::from(row)];
+            let moved = 0.3 * (TAU * 1595.1 * time_ns as f64 * 1e-9).cos();
+            let sample = binner.push(Displacement {
+                frame,
+                row,
+                time_ns,
+                shift_px: (moved + noise.draw() / known.sqrt()) as f32,
+                information_per_px2: known as f32,
+            });
+            assert!(!sample.is_some_and(|s| analyzer.push(s)));
+        }
+    }
+    binner.finish().map(|s| analyzer.push(s));
+    let report = analyzer.finish().unwrap();
+    assert_eq!(report.peaks.len(), 1, "{:?}", report.peaks);
+    let peak = report.peaks[0];
+    assert!((f64::from(peak.hz) - 1595.1).abs() < 4.0 * f64::from(peak.hz_sd));
+    assert!((peak.amplitude_px / 0.3 - 1.0).abs() < 0.005, "{peak:?}");
+}
+
 /// A tone at exactly three times the frame rate: hidden at one rate, found at two.
 #[test]
 fn two_frame_rates_hide_nothing() {
@@ -228,6 +265,7 @@ fn ten_days_are_like_the_first_second() {
                     time_ns,
                     shift_px: shift as f32,
                     information_per_px2: 62_500.0,
+                    spread: Default::default(),
                 });
                 if ready {
                     reports.extend(analyzer.report());

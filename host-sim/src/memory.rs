@@ -2,7 +2,7 @@
 
 use rowtone::report::MAX_PEAKS;
 use rowtone::spectrum::{EstimatorStorage, FrameMark, SampleBuffer, Storage};
-use rowtone::timeline::Group;
+use rowtone::timeline::{Group, Spread};
 
 /// Longest transform, points: that of the core.
 const GRID: usize = 32_768;
@@ -34,6 +34,7 @@ struct Buffer {
     shift_px: Vec<f32>,
     weight: Vec<u16>,
     skew: Vec<i16>,
+    spread: Vec<Spread>,
     frames: Vec<FrameMark>,
 }
 
@@ -43,6 +44,7 @@ impl Buffer {
             shift_px: vec![0.0; frames * slots],
             weight: vec![0; frames * slots],
             skew: vec![0; frames * slots],
+            spread: vec![Spread::default(); slots],
             frames: vec![FrameMark::default(); frames],
         }
     }
@@ -52,6 +54,7 @@ impl Buffer {
             shift_px: &mut self.shift_px,
             weight: &mut self.weight,
             skew: &mut self.skew,
+            spread: &mut self.spread,
             frames: &mut self.frames,
         }
     }

@@ -2,9 +2,9 @@
 
 use super::Reporter;
 use crate::spectrum::{
-    Config, ConfigError, FrameMark, SampleBuffer, WindowMark, pack_weight, skew_of,
+    Config, ConfigError, FrameMark, SampleBuffer, WindowMark, follow_spread, pack_weight, skew_of,
 };
-use crate::timeline::{Group, Sample};
+use crate::timeline::{Group, Sample, Spread};
 
 /// Collects samples to windows.
 #[derive(Debug)]
@@ -240,6 +240,10 @@ impl<'a> Collector<'a> {
             *x = sample.shift_px;
             *w = pack_weight(sample.information_per_px2);
             *d = skew_of(&self.group, &sample, newest.start_ns);
+        }
+        if let Some(spread) = ring.spread.get_mut(usize::from(sample.slot)) {
+            let first = self.held == 1 || *spread == Spread::default();
+            follow_spread(spread, sample.spread, first);
         }
     }
 

@@ -15,6 +15,7 @@
 )]
 
 mod alarm;
+mod blur;
 mod cholesky;
 mod config;
 mod detect;
@@ -22,19 +23,22 @@ mod estimator;
 mod fit;
 mod follow;
 mod gram;
+mod load;
 mod model;
 mod phase;
 mod plan;
 mod search;
 mod storage;
+mod tones;
 mod window;
 
 pub use config::{Config, ConfigError};
-pub use estimator::{Estimator, Tones};
+pub use estimator::Estimator;
 pub use follow::{Follower, name_harmonics};
 pub use plan::{FrameRatePlan, PlanError};
 pub use storage::{EstimatorStorage, StaticStorage, Storage};
+pub use tones::Tones;
 pub use window::{FrameMark, SampleBuffer, WindowMark};
 
 pub(crate) use phase::sin;
-pub(crate) use window::{pack_weight, skew_of};
+pub(crate) use window::{follow_spread, pack_weight, skew_of};

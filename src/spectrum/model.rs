@@ -2,9 +2,11 @@
 
 use microfft::Complex32 as Complex;
 
+use super::blur::blur;
 use super::phase::{Frequency, cos_sin, turns};
 use super::window::unpack_weight;
 use crate::report::MAX_PEAKS;
+use crate::timeline::Spread;
 
 /// Rows of the phasor tables: row 0 is the slow drift (frequency 0), the others are tones.
 pub(crate) const TABLE_ROWS: usize = MAX_PEAKS + 1;
@@ -69,6 +71,10 @@ pub(crate) struct Samples<'a> {
     pub(crate) slot_ns: &'a mut [i64],
     pub(crate) slot_t: &'a mut [f32],
     pub(crate) slot_weight: &'a mut [f32],
+    /// How a slot's rows lie in time.
+    pub(crate) spread: &'a [Spread],
+    /// The same where all rows of a slot know the same: amplitudes are told as if all slots were so.
+    pub(crate) even: Spread,
     /// Phasors, a row a tone.
     pub(crate) frame_re: &'a mut [f32],
     pub(crate) frame_im: &'a mut [f32],
@@ -129,8 +135,11 @@ impl Samples<'_> {
         let rows = self.slot_re[k * s..]
             .iter_mut()
             .zip(self.slot_im[k * s..].iter_mut());
-        for ((re, im), &ns) in rows.zip(self.slot_ns.iter().take(s)) {
-            (*re, *im) = cos_sin(tone.frequency.phase(ns));
+        let hz = tone.frequency.hz();
+        for ((re, im), (&ns, spread)) in rows.zip(self.slot_ns.iter().zip(self.spread).take(s)) {
+            let (c, s) = cos_sin(tone.frequency.phase(ns));
+            let phasor = Complex::new(c, s) * blur(hz, spread, &self.even);
+            (*re, *im) = (phasor.re, phasor.im);
         }
     }
 
@@ -147,13 +156,16 @@ impl Samples<'_> {
     fn own_phasors(&mut self, tone: &Tone, slot: usize) {
         let n = self.frames;
         let (ns, t) = (self.slot_ns[slot], self.slot_t[slot]);
+        let blur = blur(tone.frequency.hz(), &self.spread[slot], &self.even);
         for i in 0..n {
             let at = self.frame_t[i] + t;
             let phase = tone
                 .frequency
                 .phase(self.frame_ns[i].wrapping_add(ns))
                 .wrapping_add(turns(0.5 * tone.chirp * at * at));
-            (self.own_re[i], self.own_im[i]) = cos_sin(phase);
+            let (c, s) = cos_sin(phase);
+            let phasor = Complex::new(c, s) * blur;
+            (self.own_re[i], self.own_im[i]) = (phasor.re, phasor.im);
             self.row_t[i] = at;
         }
     }

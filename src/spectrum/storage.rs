@@ -1,6 +1,7 @@
 //! The memory that the collecting and the computing side work in, lent by the caller.
 
 use super::window::{FrameMark, SampleBuffer};
+use crate::timeline::Spread;
 
 /// Rows of [`EstimatorStorage::frame_rows`]: time, weight and four of scratch.
 pub(crate) const FRAME_ROWS: usize = 6;
@@ -69,6 +70,7 @@ pub struct StaticStorage<
     shift_px: [[f32; SAMPLES]; 2],
     weight: [[u16; SAMPLES]; 2],
     skew: [[i16; SAMPLES]; 2],
+    spread: [[Spread; SLOTS]; 2],
     frames: [[FrameMark; FRAMES]; 2],
     frame_ns: [i64; FRAMES],
     slot_ns: [i64; SLOTS],
@@ -93,6 +95,10 @@ impl<
             shift_px: [[0.0; SAMPLES]; 2],
             weight: [[0; SAMPLES]; 2],
             skew: [[0; SAMPLES]; 2],
+            spread: [[Spread {
+                variance_ns2: 0.0,
+                third_ns3: 0.0,
+            }; SLOTS]; 2],
             frames: [[FrameMark {
                 number: 0,
                 start_ns: 0,
@@ -112,12 +118,14 @@ impl<
         let [shift_a, shift_b] = &mut self.shift_px;
         let [weight_a, weight_b] = &mut self.weight;
         let [skew_a, skew_b] = &mut self.skew;
+        let [spread_a, spread_b] = &mut self.spread;
         let [frames_a, frames_b] = &mut self.frames;
         Storage {
             collected: SampleBuffer {
                 shift_px: shift_a,
                 weight: weight_a,
                 skew: skew_a,
+                spread: spread_a,
                 frames: frames_a,
             },
             estimator: EstimatorStorage {
@@ -125,6 +133,7 @@ impl<
                     shift_px: shift_b,
                     weight: weight_b,
                     skew: skew_b,
+                    spread: spread_b,
                     frames: frames_b,
                 },
                 frame_ns: &mut self.frame_ns,

@@ -5,7 +5,7 @@
 //! costs two multiplications a tone. What is left of a sample's own time (rows of a group weigh
 //! differently from frame to frame) is its skew, kept in small steps and applied to first order.
 
-use crate::timeline::{Group, Sample};
+use crate::timeline::{Group, Sample, Spread};
 
 /// Samples as they are collected: shift, weight and skew, 8 bytes a sample.
 #[derive(Debug)]
@@ -16,6 +16,8 @@ pub struct SampleBuffer<'a> {
     pub weight: &'a mut [u16],
     /// Time beyond that of frame and slot, in steps of the skew unit.
     pub skew: &'a mut [i16],
+    /// How the rows of each slot lie in time, one a slot.
+    pub spread: &'a mut [Spread],
     /// The frames.
     pub frames: &'a mut [FrameMark],
 }
@@ -37,6 +39,9 @@ impl SampleBuffer<'_> {
             .len()
             .min(self.weight.len())
             .min(self.skew.len());
+        if self.spread.len() < slots {
+            return 0;
+        }
         (samples / slots.max(1)).min(self.frames.len())
     }
 }
@@ -58,6 +63,23 @@ pub(crate) fn unpack_weight(weight: u16) -> f32 {
 /// Steps in which the skew is kept, ns: a whole group is 16 384 steps or less.
 pub(crate) fn skew_unit_ns(group: &Group) -> i64 {
     group.spacing_ns() / 16_384 + 1
+}
+
+/// How fast a slot's spread follows what its samples say, as a share a frame: rows that something passes
+/// before are not the slot's.
+const FOLLOW: f32 = 0.125;
+
+/// What is known of a slot's spread after one more sample; what is no spread changes nothing.
+pub(crate) fn follow_spread(known: &mut Spread, now: Spread, first: bool) {
+    let share = if first { 1.0 } else { FOLLOW };
+    let variance = known.variance_ns2 + share * (now.variance_ns2 - known.variance_ns2);
+    let third = known.third_ns3 + share * (now.third_ns3 - known.third_ns3);
+    if variance >= 0.0 && variance.is_finite() && third.is_finite() {
+        *known = Spread {
+            variance_ns2: variance,
+            third_ns3: third,
+        };
+    }
 }
 
 /// A sample's time beyond that of its frame and slot, in skew units; saturates.

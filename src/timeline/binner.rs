@@ -7,7 +7,7 @@
 
 use core::fmt;
 
-use super::{Displacement, Sample};
+use super::{Displacement, Sample, Spread};
 use crate::camera::Timing;
 use crate::spectrum::sin;
 
@@ -113,6 +113,18 @@ impl Group {
         self.rows_per_sample as i64 * self.timing.line_time_ps() as i64 / 1000
     }
 
+    /// How the times of a group's rows lie about their middle where all know the same.
+    pub const fn even_spread(&self) -> Spread {
+        let (rows, line_ns) = (
+            self.rows_per_sample as f32,
+            self.timing.line_time_ps() as f32 * 1e-3,
+        );
+        Spread {
+            variance_ns2: (rows * rows - 1.0) / 12.0 * line_ns * line_ns,
+            third_ns3: 0.0,
+        }
+    }
+
     /// What is left of a tone's amplitude after the exposure and the averaging of a group's rows, 0 to 1:
     /// sinc(f·t_exp) · sin(πfRτ)/(R·sin(πfτ)), R rows of line time τ.
     pub fn attenuation(&self, hz: f32) -> f32 {
@@ -172,6 +184,21 @@ struct Open {
     information: f32,
     weighted_shift: f32,
     weighted_ns: f32,
+    /// Σ w·x, w·x², w·x³; x in rows from the group's middle.
+    moments: [f32; 3],
+}
+
+impl Open {
+    fn spread(&self, group: &Group) -> Spread {
+        let line_ns = group.timing.line_time_ps() as f32 * 1e-3;
+        let [first, second, third] = self.moments.map(|m| m / self.information);
+        let variance = (second - first * first).max(0.0) * line_ns * line_ns;
+        let third = third - first * (3.0 * second - 2.0 * first * first);
+        Spread {
+            variance_ns2: variance,
+            third_ns3: third * line_ns * line_ns * line_ns,
+        }
+    }
 }
 
 /// Combines rows to samples.
@@ -236,11 +263,19 @@ impl Binner {
             information: 0.0,
             weighted_shift: 0.0,
             weighted_ns: 0.0,
+            moments: [0.0; 3],
         });
         open.rows = open.rows.saturating_add(1);
         open.information += information;
         open.weighted_shift += information * d.shift_px;
         open.weighted_ns += information * d.time_ns.saturating_sub(open.first_ns) as f32;
+        let x = f32::from(d.row - slot * self.group.rows_per_sample)
+            - 0.5 * f32::from(self.group.rows_per_sample - 1);
+        let mut power = information;
+        for moment in &mut open.moments {
+            power *= x;
+            *moment += power;
+        }
         done
     }
 
@@ -259,6 +294,7 @@ impl Binner {
             time_ns: open.first_ns.saturating_add(later),
             shift_px,
             information_per_px2: open.information,
+            spread: open.spread(&self.group),
         })
     }
 
@@ -313,6 +349,23 @@ mod tests {
         assert_eq!(sample.shift_px, 18.0 / 8.0);
         assert_eq!(sample.time_ns, 22_500);
         assert_eq!(sample.information_per_px2, 8.0);
+    }
+
+    #[test]
+    fn the_spread_is_that_of_the_rows_that_know_something() {
+        let mut binner = Binner::new(group());
+        for y in 0..4 {
+            binner.push(row(0, y, 0.0, 2.0));
+        }
+        let even = binner.push(row(0, 4, 0.0, 3.0)).unwrap().spread;
+        assert_eq!(even, group().even_spread());
+        for (y, w) in [(5, 1e-9), (6, 1e-9), (7, 1.0)] {
+            binner.push(row(0, y, 0.0, w));
+        }
+        // 3/4 of the weight at 0, 1/4 three lines of 10 µs later: variance 27/16, third moment 81/32 lines.
+        let uneven = binner.finish().unwrap().spread;
+        assert!((uneven.variance_ns2 / (27.0 / 16.0 * 1e8) - 1.0).abs() < 1e-5);
+        assert!((uneven.third_ns3 / (81.0 / 32.0 * 1e12) - 1.0).abs() < 1e-5);
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use rowtone::reference::RowTable;
 use rowtone::report::MAX_PEAKS;
 use rowtone::spectrum::{EstimatorStorage, FrameMark, SampleBuffer, Storage as SpectrumStorage};
-use rowtone::timeline::Group;
+use rowtone::timeline::{Group, Spread};
 use rowtone::tracker::{ColumnLearning, RowLearning, Storage as TrackerStorage};
 
 /// Longest transform, points: that of the core.
@@ -55,6 +55,7 @@ struct Samples {
     shift_px: Vec<f32>,
     weight: Vec<u16>,
     skew: Vec<i16>,
+    spread: Vec<Spread>,
     frames: Vec<FrameMark>,
 }
 
@@ -64,6 +65,7 @@ impl Samples {
             shift_px: vec![0.0; frames * slots],
             weight: vec![0; frames * slots],
             skew: vec![0; frames * slots],
+            spread: vec![Spread::default(); slots],
             frames: vec![FrameMark::default(); frames],
         }
     }
@@ -73,6 +75,7 @@ impl Samples {
             shift_px: &mut self.shift_px,
             weight: &mut self.weight,
             skew: &mut self.skew,
+            spread: &mut self.spread,
             frames: &mut self.frames,
         }
     }

@@ -12,6 +12,7 @@ use crate::failure::Failure;
 use crate::input::{CameraArgs, Feed};
 use crate::output::plot::{self, Picture};
 use crate::output::progress::Progress;
+use crate::output::zone::ZoneLimits;
 use crate::output::{Out, json, text};
 use crate::serial::{PortName, Sender};
 use crate::tracking::Shifts;
@@ -40,6 +41,9 @@ pub struct Args {
     /// Highest frequency looked for, Hz [default: 2000; half the frame rate with --global-shutter]
     #[arg(long, value_name = "F", value_parser = hertz, allow_negative_numbers = true)]
     max_hz: Option<f64>,
+    /// Where the zones B, C and D of ISO 20816 begin for this machine, mm/s RMS: adds its zone
+    #[arg(long, value_name = "B,C,D", requires = "um_per_px")]
+    zone_limits: Option<ZoneLimits>,
     /// Format of the reports on standard output
     #[arg(long, value_enum, default_value = "text")]
     format: Format,
@@ -112,6 +116,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     });
     let mut outlets = Outlets {
         format: args.format,
+        zone_limits: args.zone_limits,
         progress: Progress::new(shifts.frames),
         out: Out::default(),
         serial,
@@ -156,6 +161,7 @@ fn session() -> u32 {
 /// Where reports go.
 struct Outlets {
     format: Format,
+    zone_limits: Option<ZoneLimits>,
     progress: Progress,
     out: Out,
     serial: Option<Sender>,
@@ -201,8 +207,8 @@ impl Outlets {
         }
         let out = &mut self.out;
         self.progress.aside(|| match self.format {
-            Format::Text => out.line(&text::report(report)),
-            Format::Json => out.line(&json::report(report)),
+            Format::Text => out.line(&text::zoned(report, self.zone_limits.as_ref())),
+            Format::Json => out.line(&json::zoned(report, self.zone_limits.as_ref())),
             Format::Wire => sentence.map_or(Ok(()), |s| out.line(s.trim_end_matches('\n'))),
         })
     }

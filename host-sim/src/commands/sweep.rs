@@ -4,8 +4,9 @@ use std::io::Write;
 
 use crate::failure::Failure;
 use crate::line_scenes::{case, table as line_table};
+use crate::output::Out;
 use crate::spectrum_scenes::score::Score;
-use crate::spectrum_scenes::table;
+use crate::spectrum_scenes::{cameras, table};
 
 /// Options of `rowtone sweep`.
 #[derive(Debug, clap::Args)]
@@ -21,6 +22,8 @@ pub struct Args {
 enum What {
     /// Random displacement samples with known tones: what is found, what is not there, errors over their bounds
     Spectrum(Spectrum),
+    /// Whole simulated recordings with known tones, from the pictures to the report: the same table
+    Cameras(Cameras),
     /// Simulated recordings through the line engine: noise over the bound, amplitude, what it invents
     Lines(Lines),
 }
@@ -58,6 +61,29 @@ struct Spectrum {
     /// Which series of scenes
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// Also lists the scenes in which a tone was missed or invented
+    #[arg(long)]
+    failures: bool,
+}
+
+/// Options of `rowtone sweep cameras`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Every recording is of another sensor, frame rate, blank time, exposure, picture and noise, and is analysed as
+`rowtone analyze` does. Columns as of `rowtone sweep spectrum`; bounds are those of the pictures' own noise.
+
+Example:
+  rowtone sweep cameras --scenes 50 --seed 1")]
+struct Cameras {
+    /// Recordings of each kind
+    #[arg(long, default_value_t = 50)]
+    scenes: u64,
+    /// Which series of recordings
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Also lists the recordings in which a tone was missed or invented
+    #[arg(long)]
+    failures: bool,
 }
 
 /// Runs the sweep.
@@ -67,6 +93,7 @@ struct Spectrum {
 pub fn run(args: &Args) -> Result<(), Failure> {
     match &args.what {
         What::Spectrum(options) => spectrum(options),
+        What::Cameras(options) => camera_scenes(options),
         What::Lines(options) => lines(options),
     }
 }
@@ -86,12 +113,32 @@ fn lines(options: &Lines) -> Result<(), Failure> {
 }
 
 fn spectrum(options: &Spectrum) -> Result<(), Failure> {
-    let mut out = std::io::stdout().lock();
-    let failed = |error| Failure::writing("standard output", &error);
-    writeln!(out, "{}", table::head()).map_err(failed)?;
+    heading()?;
     for kind in table::kinds() {
         let score = Score::of(&kind.ranges, options.seed, options.scenes);
-        writeln!(out, "{}", table::row(kind.name, &score)).map_err(failed)?;
+        row(kind.name, &score, options.failures)?;
+    }
+    Ok(())
+}
+
+fn camera_scenes(options: &Cameras) -> Result<(), Failure> {
+    heading()?;
+    for kind in table::camera_kinds() {
+        let score = cameras::score(&kind.ranges, options.seed, options.scenes)?;
+        row(kind.name, &score, options.failures)?;
+    }
+    Ok(())
+}
+
+fn heading() -> Result<(), Failure> {
+    Out::default().line(&table::head())
+}
+
+fn row(name: &str, score: &Score, failures: bool) -> Result<(), Failure> {
+    let mut out = Out::default();
+    out.line(&table::row(name, score))?;
+    for failure in score.failures.iter().filter(|_| failures) {
+        out.line(&format!("    {failure}"))?;
     }
     Ok(())
 }

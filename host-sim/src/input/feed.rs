@@ -7,7 +7,7 @@
 use std::fs::File;
 use std::io::{self, Read};
 
-use super::clock::Clock;
+use super::clock::{Clock, Times};
 use super::mapped::MappedReader;
 use super::y4m::{FrameSource, Next, Reader};
 use super::{Camera, CameraArgs, Frame, Turn};
@@ -72,8 +72,8 @@ impl Feed {
         let behind_header = meta.len().saturating_sub(reader.header_bytes() as u64);
         let frames = Some(behind_header / reader.stride() as u64);
         match MappedReader::new(&reader) {
-            Ok(mapped) => Self::start(args, mapped, frames),
-            Err(_) => Self::start(args, reader, frames),
+            Ok(mapped) => Self::start(args, mapped, frames, None),
+            Err(_) => Self::start(args, reader, frames, None),
         }
     }
 
@@ -84,17 +84,37 @@ impl Feed {
     pub fn read(args: &CameraArgs, from: impl Read + Send + 'static) -> Result<Self, Failure> {
         args.check()?;
         let reader = Reader::open(from, args.name())?;
-        Self::start(args, reader, None)
+        Self::start(args, reader, None, None)
     }
 
-    /// Starts the reading thread. `frames`: how many there are, where that is known.
+    /// Reads `from`, of which the frames' times are known otherwise than by a file that `args` name.
+    ///
+    /// # Errors
+    /// As [`Feed::open`].
+    pub fn at_times(
+        args: &CameraArgs,
+        from: impl Read + Send + 'static,
+        times: Times,
+    ) -> Result<Self, Failure> {
+        args.check()?;
+        let reader = Reader::open(from, args.name())?;
+        let frames = Some(times.len() as u64);
+        Self::start(args, reader, frames, Some(Clock::Times(times)))
+    }
+
+    /// Starts the reading thread. `frames`: how many there are, where that is known; `clock`: their times, where `args`
+    /// do not say.
     fn start(
         args: &CameraArgs,
         source: impl FrameSource + Send + 'static,
         frames: Option<u64>,
+        clock: Option<Clock>,
     ) -> Result<Self, Failure> {
         let name = args.name().to_owned();
-        let clock = args.clock(source.header())?;
+        let clock = match clock {
+            Some(clock) => clock,
+            None => args.clock(source.header())?,
+        };
         let camera = args.camera(source.header(), clock.fps())?;
         let block = match frames {
             Some(_) => BLOCK_BYTES / source.header().luma_bytes(),

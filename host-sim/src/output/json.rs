@@ -3,6 +3,7 @@
 use rowtone::report::{Peak, Report};
 use serde::Serialize;
 
+use super::zone::ZoneLimits;
 use super::{band_velocity, velocity_mm_s_rms, warnings};
 
 #[derive(Serialize)]
@@ -16,6 +17,8 @@ struct ReportObject {
     noise_px: f32,
     #[serde(skip_serializing_if = "Option::is_none")]
     velocity_mm_s_rms: Option<f32>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    zone: Option<char>,
     peaks: Vec<PeakObject>,
     warnings: Vec<&'static str>,
 }
@@ -32,6 +35,9 @@ struct PeakObject {
     velocity_mm_s_rms: Option<f32>,
     snr_db: f32,
     ambiguous: bool,
+    track: u16,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    harmonic: Option<u8>,
 }
 
 impl PeakObject {
@@ -47,12 +53,20 @@ impl PeakObject {
                 .map(|um| velocity_mm_s_rms(peak.hz.into(), um.into()) as f32),
             snr_db: peak.snr_db,
             ambiguous: peak.ambiguous,
+            track: peak.track,
+            harmonic: peak.harmonic,
         }
     }
 }
 
 /// One report as a JSON object, without a line feed.
 pub fn report(report: &Report) -> String {
+    zoned(report, None)
+}
+
+/// The same, with the machine's zone where the limits are given and there is a scale.
+pub fn zoned(report: &Report, limits: Option<&ZoneLimits>) -> String {
+    let velocity = band_velocity(report);
     let object = ReportObject {
         seq: report.seq,
         t_s: report.time_ms as f64 / 1000.0,
@@ -61,7 +75,8 @@ pub fn report(report: &Report) -> String {
         lines: report.lines,
         lost_frames: report.lost_frames,
         noise_px: report.noise_px,
-        velocity_mm_s_rms: band_velocity(report).map(|v| v as f32),
+        velocity_mm_s_rms: velocity.map(|v| v as f32),
+        zone: limits.zip(velocity).map(|(limits, v)| limits.zone(v)),
         peaks: report
             .peaks
             .iter()
@@ -84,9 +99,9 @@ mod tests {
             concat!(
                 r#"{"seq":3,"t_s":2.5,"window_s":1.0,"fps":60.0,"lines":18000,"lost_frames":2,"#,
                 r#""noise_px":0.0131,"peaks":[{"hz":49.2003,"hz_sd":0.0004,"amplitude_px":0.3998,"#,
-                r#""amplitude_px_sd":0.0002,"snr_db":61.2,"ambiguous":false},{"hz":1500.0,"#,
+                r#""amplitude_px_sd":0.0002,"snr_db":61.2,"ambiguous":false,"track":1},{"hz":1500.0,"#,
                 r#""hz_sd":0.0004,"amplitude_px":0.02,"amplitude_px_sd":0.0002,"snr_db":61.2,"#,
-                r#""ambiguous":false}],"warnings":["lost_frames","disturbed"]}"#
+                r#""ambiguous":false,"track":1}],"warnings":["lost_frames","disturbed"]}"#
             )
         );
     }
@@ -102,5 +117,10 @@ mod tests {
         close(&object["peaks"][0]["amplitude_um"], 39.98);
         close(&object["peaks"][0]["velocity_mm_s_rms"], 8.7395);
         close(&object["velocity_mm_s_rms"], 8.7395);
+        assert!(object.get("zone").is_none());
+        let limits = "2.3,4.5,7.1".parse().unwrap();
+        let text = super::zoned(&example(Some(100.0)), Some(&limits));
+        assert!(text.contains(r#""zone":"D""#), "{text}");
+        assert!(!super::zoned(&example(None), Some(&limits)).contains("zone"));
     }
 }

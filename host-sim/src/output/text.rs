@@ -4,10 +4,16 @@ use std::fmt::Write;
 
 use rowtone::report::{Peak, Report};
 
+use super::zone::ZoneLimits;
 use super::{band_velocity, velocity_mm_s_rms, warnings};
 
 /// A report as a heading and one line a peak, without the last line feed.
 pub fn report(report: &Report) -> String {
+    zoned(report, None)
+}
+
+/// The same, with the machine's zone where the limits are given and there is a scale.
+pub fn zoned(report: &Report, limits: Option<&ZoneLimits>) -> String {
     let mut text = format!(
         "{:8.2} s  #{}: {:.2} s at {:.3} fps, {} rows, noise {} px a row",
         report.time_ms as f64 / 1000.0,
@@ -20,6 +26,9 @@ pub fn report(report: &Report) -> String {
     // Writing to a string cannot fail.
     if let Some(velocity) = band_velocity(report) {
         let _ = write!(text, ", {velocity:.3} mm/s RMS (10-1000 Hz)");
+        if let Some(limits) = limits {
+            let _ = write!(text, ", zone {}", limits.zone(velocity));
+        }
     }
     if report.peaks.is_empty() {
         text.push_str("\n            no vibration above the noise");
@@ -96,5 +105,11 @@ mod tests {
              \x20           note: something passed through the picture: its rows were left out"
         );
         assert!(super::report(&example(Some(10.0))).contains("µm"));
+        let limits = "0.5,2.8,7.1".parse().unwrap();
+        let text = super::zoned(&example(Some(10.0)), Some(&limits));
+        assert!(
+            text.contains("0.874 mm/s RMS (10-1000 Hz), zone B"),
+            "{text}"
+        );
     }
 }

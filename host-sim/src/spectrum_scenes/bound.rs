@@ -109,6 +109,7 @@ mod tests {
                 time_ns: i64::from(i) * 500_000,
                 shift_px: 0.0,
                 information_per_px2: 100.0,
+                spread: Default::default(),
             })
             .collect();
         let bound = Bound::of(&samples, 1.0, &[(123.4, 0.3)])[0];

@@ -68,35 +68,63 @@ pub struct TrueTone {
     pub amplitude_bound_px: f64,
 }
 
+/// What is true in one window.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Truth {
+    /// Frame rate, Hz.
+    pub fps: f64,
+    /// Window, s.
+    pub window_s: f64,
+    /// What is in it.
+    pub tones: Vec<TrueTone>,
+}
+
 /// One window of samples and its truth.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scene {
     /// Groups of rows.
     pub group: Group,
-    /// Frame rate, Hz.
-    pub fps: f64,
-    /// Window, s.
-    pub window_s: f64,
     /// In the order in which a camera would give them.
     pub samples: Vec<Sample>,
-    /// What is in them.
-    pub tones: Vec<TrueTone>,
+    /// What is true.
+    pub truth: Truth,
 }
 
 /// Random numbers of a scene.
-struct Draw(ChaCha8Rng);
+pub(super) struct Draw(ChaCha8Rng);
 
 impl Draw {
-    fn unit(&mut self) -> f64 {
+    /// Those of scene `number` of the series `seed`.
+    pub(super) fn new(seed: u64, number: u64) -> Self {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        rng.set_stream(number);
+        Self(rng)
+    }
+
+    /// Evenly from 0 to 1.
+    pub(super) fn unit(&mut self) -> f64 {
         (self.0.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    fn from(&mut self, range: [f64; 2]) -> f64 {
+    /// Evenly from a range.
+    pub(super) fn from(&mut self, range: [f64; 2]) -> f64 {
         range[0] + (range[1] - range[0]) * self.unit()
     }
 
     fn normal(&mut self) -> f64 {
         StandardNormal.sample(&mut self.0)
+    }
+
+    /// So many frequencies within `band`, Hz, none nearer than `apart_hz` to another.
+    pub(super) fn frequencies(&mut self, count: usize, band: [f64; 2], apart_hz: f64) -> Vec<f64> {
+        let mut hz: Vec<f64> = Vec::new();
+        while hz.len() < count {
+            let f = self.from(band);
+            if hz.iter().all(|g| (f - g).abs() >= apart_hz) {
+                hz.push(f);
+            }
+        }
+        hz
     }
 }
 
@@ -106,9 +134,7 @@ impl Scene {
     /// # Panics
     /// When the ranges make no camera (a sample rate below a few frame rates).
     pub fn draw(ranges: &Ranges, seed: u64, number: u64) -> Self {
-        let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        rng.set_stream(number);
-        let mut draw = Draw(rng);
+        let mut draw = Draw::new(seed, number);
         let fps = draw.from(ranges.fps);
         let blank = draw.from(ranges.blank);
         let window_s = draw.from(ranges.window_s);
@@ -143,24 +169,29 @@ impl Scene {
                     time_ns,
                     shift_px: shift as f32,
                     information_per_px2: (information * claim) as f32,
+                    spread: Default::default(),
                 });
             }
         }
         let mut scene = Self {
             group,
-            fps,
-            window_s,
             samples,
-            tones: Vec::new(),
+            truth: Truth {
+                fps,
+                window_s,
+                tones: Vec::new(),
+            },
         };
         let count = ranges.tones[0]
             + (draw.unit() * (ranges.tones[1] - ranges.tones[0] + 1) as f64) as usize;
-        let hz = scene.frequencies(&mut draw, count, ranges.apart);
+        let top = 0.45e9 / scene.group.spacing_ns() as f64;
+        let hz = draw.frequencies(count, [5.0, top], ranges.apart / window_s);
         scene.add_tones(&mut draw, &hz, ranges, claim);
         let creep = draw.from([-ranges.creep_px_per_s, ranges.creep_px_per_s]);
         for sample in &mut scene.samples {
             let t = sample.time_ns as f64 * 1e-9;
             let moved: f64 = scene
+                .truth
                 .tones
                 .iter()
                 .map(|tone| tone.amplitude_px * (TAU * tone.hz * t + tone.phase_rad).cos())
@@ -170,19 +201,6 @@ impl Scene {
         scene
     }
 
-    /// 5 Hz to 0.45 of the sample rate, apart.
-    fn frequencies(&self, draw: &mut Draw, count: usize, apart: f64) -> Vec<f64> {
-        let top = 0.45e9 / self.group.spacing_ns() as f64;
-        let mut hz: Vec<f64> = Vec::new();
-        while hz.len() < count {
-            let f = draw.from([5.0, top]);
-            if hz.iter().all(|g| (f - g).abs() * self.window_s >= apart) {
-                hz.push(f);
-            }
-        }
-        hz
-    }
-
     fn add_tones(&mut self, draw: &mut Draw, hz: &[f64], ranges: &Ranges, claim: f64) {
         let phases: Vec<f64> = hz.iter().map(|_| draw.from([0.0, TAU])).collect();
         let unit: Vec<(f64, f64)> = hz.iter().copied().zip(phases.iter().copied()).collect();
@@ -190,7 +208,7 @@ impl Scene {
         let db = ranges.over_bound.map(f64::log10);
         for ((&hz, &phase_rad), bound) in hz.iter().zip(&phases).zip(bounds) {
             let amplitude_px = bound.amplitude_px * 10_f64.powf(draw.from(db));
-            self.tones.push(TrueTone {
+            self.truth.tones.push(TrueTone {
                 hz,
                 amplitude_px,
                 phase_rad,

@@ -4,7 +4,7 @@ use rowtone::analyzer::Analyzer;
 use rowtone::report::{Peak, Report};
 use rowtone::spectrum::Config;
 
-use super::scene::{Ranges, Scene};
+use super::scene::{Ranges, Scene, TrueTone, Truth};
 use crate::memory::SpectrumMemory;
 
 /// Counts and errors of many scenes.
@@ -22,6 +22,8 @@ pub struct Score {
     pub false_peaks: usize,
     /// Those of them a multiple of the frame rate away from a tone.
     pub ghosts: usize,
+    /// What went wrong, in words, a line a scene.
+    pub failures: Vec<String>,
     hz_over_bound: f64,
     amplitude_over_bound: f64,
     hz_over_sd: f64,
@@ -34,13 +36,21 @@ impl Score {
         let mut score = Self::default();
         for number in 0..count {
             let scene = Scene::draw(ranges, seed, number);
-            score.add(&scene, &analyze(&scene));
+            score.add(number, &scene.truth, &analyze(&scene));
         }
         score
     }
 
-    /// Adds a scene's report.
-    pub fn add(&mut self, scene: &Scene, report: &Report) {
+    /// Adds the report of scene `number`.
+    pub fn add(&mut self, number: u64, scene: &Truth, report: &Report) {
+        let (found, strays) = (self.found, self.false_peaks);
+        self.count(scene, report);
+        if self.found - found < scene.tones.len() || self.false_peaks > strays {
+            self.failures.push(describe(number, scene, report));
+        }
+    }
+
+    fn count(&mut self, scene: &Truth, report: &Report) {
         self.scenes += 1;
         self.tones += scene.tones.len();
         let reach = 0.5 / scene.window_s;
@@ -104,16 +114,33 @@ impl Score {
     }
 }
 
+/// A scene and what was made of it.
+fn describe(number: u64, scene: &Truth, report: &Report) -> String {
+    let tone = |t: &TrueTone| {
+        let over = t.amplitude_px / t.amplitude_bound_px;
+        format!("{:.3} Hz {:.5} px ({over:.0})", t.hz, t.amplitude_px)
+    };
+    let peak = |p: &Peak| format!("{:.3} Hz {:.5} px", p.hz, p.amplitude_px);
+    let list = |items: Vec<String>| items.join(", ");
+    format!(
+        "scene {number}, {:.2} fps, {:.2} s; true: {}; found: {}",
+        scene.fps,
+        scene.window_s,
+        list(scene.tones.iter().map(tone).collect()),
+        list(report.peaks.iter().map(peak).collect()),
+    )
+}
+
 /// The report of a scene's only window.
 ///
 /// # Panics
 /// When the scene has no samples.
 pub fn analyze(scene: &Scene) -> Report {
     let config = Config {
-        window_ns: (scene.window_s * 2e9) as i64,
+        window_ns: (scene.truth.window_s * 2e9) as i64,
         ..Config::default()
     };
-    let mut memory = SpectrumMemory::new(scene.group, scene.window_s, scene.fps);
+    let mut memory = SpectrumMemory::new(scene.group, scene.truth.window_s, scene.truth.fps);
     let mut analyzer =
         Analyzer::new(config, scene.group, memory.lend()).expect("the memory fits the scene");
     for sample in &scene.samples {

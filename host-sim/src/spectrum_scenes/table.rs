@@ -2,16 +2,49 @@
 
 use std::fmt::Write;
 
+use super::cameras;
 use super::scene::Ranges;
 use super::score::Score;
 
 /// A row: what is special about its scenes.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Kind {
+pub struct Kind<R = Ranges> {
     /// In words.
     pub name: &'static str,
     /// What is drawn.
-    pub ranges: Ranges,
+    pub ranges: R,
+}
+
+/// The kinds of whole recordings; the first is all of it.
+pub fn camera_kinds() -> Vec<Kind<cameras::Ranges>> {
+    let all = cameras::Ranges::default;
+    vec![
+        Kind {
+            name: "recordings, all",
+            ranges: all(),
+        },
+        Kind {
+            name: "blank 40-45 %",
+            ranges: cameras::Ranges {
+                blank: [0.40, 0.45],
+                ..all()
+            },
+        },
+        Kind {
+            name: "10-100 times the bound",
+            ranges: cameras::Ranges {
+                over_bound: [10.0, 100.0],
+                ..all()
+            },
+        },
+        Kind {
+            name: "noise only",
+            ranges: cameras::Ranges {
+                tones: [0, 0],
+                ..all()
+            },
+        },
+    ]
 }
 
 /// The kinds of scenes of the figures; the first is all of it.

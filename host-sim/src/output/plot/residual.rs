@@ -190,6 +190,7 @@ mod tests {
                     time_ns: (t * 1e9) as i64,
                     shift_px: (tone + f64::from(slot) * 0.01) as f32,
                     information_per_px2: 1e4,
+                    spread: Default::default(),
                 }
             })
             .collect();

@@ -1,0 +1,149 @@
+//! What is said of the fitted tones: amplitudes of the object, standard deviations, what is not to be trusted.
+
+use super::config::Config;
+use super::detect::Band;
+use super::fit::{Fit, Model};
+use super::model::Samples;
+use crate::report::{MAX_PEAKS, Peak};
+use crate::timeline::Group;
+
+/// Below this share of an amplitude left by exposure and averaging, a tone is not reported: its amplitude would
+/// be guessed.
+const LEAST_ATTENUATION: f32 = 0.15;
+
+/// A tone of which the amplitude is not known better than this (over its standard deviation) is no peak: it is all
+/// but hidden by a multiple of the frame rate.
+const LEAST_KNOWN: f32 = 3.0;
+
+/// Tones nearer than this many 1/T to a multiple of the frame rate are ambiguous.
+const NEAR_MULTIPLE: f32 = 1.0;
+
+/// A tone of which less than this share is left after the projection is ambiguous.
+const KEPT_ENOUGH: f32 = 0.6;
+
+/// What was found in a window.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Tones {
+    /// The tones, the largest amplitude first. Not yet tracked.
+    pub peaks: heapless::Vec<Peak, MAX_PEAKS>,
+    /// Change of frequency over time of each peak, Hz/s; 0 where a steady tone explains it.
+    pub hz_per_s: heapless::Vec<f32, MAX_PEAKS>,
+    /// There were more tones than fit.
+    pub more: bool,
+    /// A vibration at a multiple of the frame rate would not be seen.
+    pub hidden: bool,
+    /// Frame rate, Hz; 0 with less than two frames.
+    pub fps: f32,
+    /// Standard deviation of a sample of average weight, px.
+    pub sample_noise_px: f32,
+    /// Standard deviation of one row, px.
+    pub row_noise_px: f32,
+}
+
+impl Tones {
+    /// A window in which nothing can be found.
+    pub(crate) fn nothing(fps: f32) -> Self {
+        Self {
+            fps,
+            ..Self::default()
+        }
+    }
+}
+
+/// What must be known to tell of a fitted model.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Telling<'a> {
+    pub(crate) config: &'a Config,
+    pub(crate) group: &'a Group,
+    pub(crate) band: Band,
+    pub(crate) fps: f32,
+}
+
+impl Telling<'_> {
+    /// The tones of `model`, those that are asked for and known well enough.
+    pub(crate) fn tones(&self, samples: &mut Samples<'_>, fit: &mut Fit, model: &Model) -> Tones {
+        let mut tones = Tones::nothing(self.fps);
+        // Weights have a mean of one, so this is px² already.
+        let variance = model.squares / Fit::freedom(samples, model).max(1.0);
+        let noise = libm::sqrtf(variance);
+        if noise.is_finite() {
+            tones.sample_noise_px = noise;
+            tones.row_noise_px = noise * libm::sqrtf(f32::from(self.group.rows_per_sample()));
+        }
+        let (low, high) = self.asked_hz();
+        let regressors = fit.weigh(samples, model);
+        let mut list: heapless::Vec<(Peak, f32), MAX_PEAKS> = heapless::Vec::new();
+        for (i, tone) in model.tones.iter().enumerate() {
+            let hz = tone.frequency.hz();
+            let attenuation = self.group.attenuation(hz);
+            if !(low..=high).contains(&hz) || attenuation < LEAST_ATTENUATION {
+                continue;
+            }
+            let amplitude = libm::sqrtf(tone.amplitude.norm_sqr());
+            let unit = fit.deviation(&regressors, model, i, samples.length_s);
+            let kept = samples.kept(&samples.frame_means(i + 1));
+            let power = samples.total_weight * amplitude * amplitude / (4.0 * variance).max(1e-30);
+            let peak = Peak {
+                hz,
+                hz_sd: noise * unit.hz,
+                amplitude_px: amplitude / attenuation,
+                amplitude_px_sd: noise * unit.amplitude_px / attenuation,
+                snr_db: 10.0 * libm::log10f(power.max(1e-9)),
+                ambiguous: self.near_multiple(hz, samples.length_s) || kept < KEPT_ENOUGH,
+                track: 0,
+                harmonic: None,
+            };
+            if is_sound(&peak) {
+                let slope = tone.chirp / (samples.length_s * samples.length_s);
+                let _ = list.push((peak, slope));
+            }
+        }
+        largest_first(&mut list);
+        tones.more = list.len() > self.config.max_peaks;
+        list.truncate(self.config.max_peaks);
+        for (peak, slope) in &list {
+            let _ = tones.peaks.push(*peak);
+            let _ = tones.hz_per_s.push(*slope);
+        }
+        tones.hidden = self.band.fps.is_some_and(|fps| {
+            let lowest = low.max(self.band.lowest_hz);
+            let first = fps * libm::ceilf(lowest / fps).max(1.0);
+            first <= high.min(self.band.highest_hz)
+        });
+        tones
+    }
+
+    /// Lowest and highest frequency that is reported.
+    fn asked_hz(&self) -> (f32, f32) {
+        let low = self.config.min_hz.unwrap_or(0.0);
+        let high = self.config.max_hz.unwrap_or(f32::INFINITY);
+        (low, high)
+    }
+
+    fn near_multiple(&self, hz: f32, length_s: f32) -> bool {
+        self.band.fps.is_some_and(|fps| {
+            let away = hz - fps * libm::roundf(hz / fps);
+            away.abs() * length_s < NEAR_MULTIPLE
+        })
+    }
+}
+
+/// All of its numbers are numbers, and its amplitude is known.
+fn is_sound(peak: &Peak) -> bool {
+    peak.amplitude_px > LEAST_KNOWN * peak.amplitude_px_sd
+        && peak.hz_sd.is_finite()
+        && peak.amplitude_px.is_finite()
+        && peak.amplitude_px_sd.is_finite()
+}
+
+/// Insertion: there are sixteen at most, and the library's sort is 2 KiB of flash.
+fn largest_first(list: &mut [(Peak, f32)]) {
+    for end in 1..list.len() {
+        for i in (0..end).rev() {
+            if list[i].0.amplitude_px >= list[i + 1].0.amplitude_px {
+                break;
+            }
+            list.swap(i, i + 1);
+        }
+    }
+}
