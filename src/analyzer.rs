@@ -83,6 +83,11 @@ impl<'a> Analyzer<'a> {
         self.report()
     }
 
+    /// Passes over the samples that the last window took: what its cost is proportional to.
+    pub const fn passes(&self) -> u32 {
+        self.reporter.passes()
+    }
+
     /// Samples dropped so far: they knew nothing, came late, or were of no slot.
     pub const fn dropped_samples(&self) -> u32 {
         self.collector.dropped_samples()

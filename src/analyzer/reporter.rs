@@ -41,6 +41,11 @@ impl<'a> Reporter<'a> {
         Ok(())
     }
 
+    /// Passes over the samples that the last window took: what its cost is proportional to.
+    pub const fn passes(&self) -> u32 {
+        self.estimator.passes()
+    }
+
     pub(crate) fn load(
         &mut self,
         mark: WindowMark,

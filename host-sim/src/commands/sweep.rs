@@ -6,7 +6,7 @@ use crate::failure::Failure;
 use crate::line_scenes::{case, table as line_table};
 use crate::output::Out;
 use crate::spectrum_scenes::score::Score;
-use crate::spectrum_scenes::{cameras, table};
+use crate::spectrum_scenes::{cameras, days, few, table};
 
 /// Options of `rowtone sweep`.
 #[derive(Debug, clap::Args)]
@@ -24,6 +24,10 @@ enum What {
     Spectrum(Spectrum),
     /// Whole simulated recordings with known tones, from the pictures to the report: the same table
     Cameras(Cameras),
+    /// The thesis's test: tones of 75 to 325 Hz in a handful of frames at 120 fps, with their bounds
+    FewFrames(FewFrames),
+    /// Days of samples at 50 000 lines a second through one analyzer: drift, growth, wrapped counters
+    Days(Days),
     /// Simulated recordings through the line engine: noise over the bound, amplitude, what it invents
     Lines(Lines),
 }
@@ -86,6 +90,44 @@ struct Cameras {
     failures: bool,
 }
 
+/// Options of `rowtone sweep few-frames`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Columns: frames; amplitude; tone; share of its energy that the rows' unknown offsets leave; Cramér-Rao bound of
+its frequency, and with a slow drift unknown as well; largest error; peaks that are no tone.
+
+Example:
+  rowtone sweep few-frames --scenes 3")]
+struct FewFrames {
+    /// Recordings of each tone
+    #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u64).range(1..))]
+    scenes: u64,
+    /// Which series of recordings
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Columns of the picture: the thesis had 1040
+    #[arg(long, value_name = "N", default_value_t = 1040, value_parser = clap::value_parser!(u32).range(64..=1040))]
+    cols: u32,
+}
+
+/// Options of `rowtone sweep days`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Columns: day; windows reported (1 s each, every 5 s); those without the tone; peaks that are no tone; mean and
+standard deviation of the frequency's error; mean error of the amplitude; largest error of a report's time;
+memory of this process.
+
+Example:
+  rowtone sweep days --days 10")]
+struct Days {
+    /// Days to simulate: each is 1.7 hundred million samples
+    #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    days: u32,
+    /// Which series of noise
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+}
+
 /// Runs the sweep.
 ///
 /// # Errors
@@ -94,6 +136,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     match &args.what {
         What::Spectrum(options) => spectrum(options),
         What::Cameras(options) => camera_scenes(options),
+        What::FewFrames(options) => few_frames(options),
+        What::Days(options) => many_days(options),
         What::Lines(options) => lines(options),
     }
 }
@@ -128,6 +172,32 @@ fn camera_scenes(options: &Cameras) -> Result<(), Failure> {
         row(kind.name, &score, options.failures)?;
     }
     Ok(())
+}
+
+fn few_frames(options: &FewFrames) -> Result<(), Failure> {
+    let mut out = Out::default();
+    out.line(&few::head())?;
+    for frames in [5, 6] {
+        for px in [0.5, 0.05] {
+            for row in few::rows_of(frames, px, options.cols, options.seed, options.scenes)? {
+                out.line(&few::line(frames, px, &row))?;
+            }
+        }
+    }
+    Ok(())
+}
+
+fn many_days(options: &Days) -> Result<(), Failure> {
+    let mut out = Out::default();
+    out.line(&days::head())?;
+    let (mut number, mut outcome) = (0, Ok(()));
+    days::run(options.days, options.seed, |day| {
+        number += 1;
+        if outcome.is_ok() {
+            outcome = out.line(&days::line(number, day));
+        }
+    });
+    outcome
 }
 
 fn heading() -> Result<(), Failure> {

@@ -14,10 +14,17 @@ pub struct Bound {
 }
 
 impl Bound {
-    /// Bounds of tones (frequency Hz, phase rad) beside each other; `claim`: the samples' information over the true one.
+    /// Bounds of tones (frequency Hz, phase rad) beside each other and a slow drift, t and t²; `claim`: the samples'
+    /// information over the true one.
     pub fn of(samples: &[Sample], claim: f64, tones: &[(f64, f64)]) -> Vec<Self> {
+        Self::beside(samples, claim, tones, 2)
+    }
+
+    /// The same with `drift` powers of time in the drift, 0 to 2.
+    pub fn beside(samples: &[Sample], claim: f64, tones: &[(f64, f64)], drift: usize) -> Vec<Self> {
         let middle = samples.iter().map(|s| s.time_ns as f64).sum::<f64>() / samples.len() as f64;
-        let unknowns = 3 * tones.len() + 2;
+        let drift = drift.min(2);
+        let unknowns = 3 * tones.len() + drift;
         let slots = samples
             .iter()
             .map(|s| usize::from(s.slot) + 1)
@@ -37,8 +44,7 @@ impl Bound {
                 row[3 * i + 1] = -sin;
                 row[3 * i + 2] = -sin * TAU * t;
             }
-            row[unknowns - 2] = t;
-            row[unknowns - 1] = t * t;
+            row[3 * tones.len()..].copy_from_slice(&[t, t * t][..drift]);
             for i in 0..unknowns {
                 for j in 0..=i {
                     fisher[i][j] += w * row[i] * row[j];

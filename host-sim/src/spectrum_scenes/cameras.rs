@@ -124,12 +124,9 @@ impl Recording {
         let times = Times::new(starts, Some(sensor.fps))
             .ok_or_else(|| Failure::input("the simulated recording: no frame arrives"))?;
         let bytes = clip.len() as u64;
-        let shifts = Shifts::start(Feed::at_times(
-            &args,
-            Cursor::new(clip),
-            Some(bytes),
-            times,
-        )?)?;
+        let feed = Feed::at_times(&args, Cursor::new(clip), Some(bytes), times)?;
+        let mut shifts = Shifts::start(feed)?;
+        shifts.quiet = true;
         let plan = Plan::new(
             &shifts,
             &Settings {
@@ -203,7 +200,7 @@ fn still(draw: &mut Draw, ranges: &Ranges, seed: u64) -> sim::Config {
 }
 
 /// What each row that arrives could at best know, as samples of one row.
-fn rows(camera: &Camera) -> Vec<Sample> {
+pub(super) fn rows(camera: &Camera) -> Vec<Sample> {
     let bounds = crlb::row_bounds_px(camera);
     let timing = camera.timing();
     let mut rows = Vec::new();

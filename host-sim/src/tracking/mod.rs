@@ -63,6 +63,8 @@ pub struct Shifts {
     pub frames: Option<u64>,
     /// What to call the recording in messages.
     pub name: String,
+    /// What was chosen for the user is not told on standard error.
+    pub quiet: bool,
 }
 
 impl Shifts {
@@ -94,6 +96,7 @@ impl Shifts {
             part,
             frames,
             name,
+            quiet: false,
         })
     }
 
@@ -105,7 +108,9 @@ impl Shifts {
     pub fn next_frame(&mut self) -> Result<Option<FrameShifts>, Failure> {
         match self.inlet.receive() {
             Next::Item(mut frame) => {
-                if let Some(note) = frame.note.take() {
+                if let Some(note) = frame.note.take()
+                    && !self.quiet
+                {
                     eprintln!("rowtone: {}: {note}", self.name);
                 }
                 if self.camera.background.is_some() {
