@@ -123,8 +123,7 @@ impl Recording {
         let starts = self.camera.arriving().map(|slot| slot.start_ns).collect();
         let times = Times::new(starts, Some(sensor.fps))
             .ok_or_else(|| Failure::input("the simulated recording: no frame arrives"))?;
-        let bytes = clip.len() as u64;
-        let feed = Feed::at_times(&args, Cursor::new(clip), Some(bytes), times)?;
+        let feed = Feed::at_times(&args, Cursor::new(clip), times)?;
         let mut shifts = Shifts::start(feed)?;
         shifts.quiet = true;
         let plan = Plan::new(
