@@ -329,6 +329,7 @@ mod tests {
                     time_ns: start_ns + group.middle_ns(slot),
                     shift_px: 0.01 * ((frame * 7 + u32::from(slot) * 3) % 11) as f32,
                     information_per_px2: 1e4,
+                    spread: Spread::default(),
                 });
                 if complete {
                     reports.extend(analyzer.report());
