@@ -3,7 +3,7 @@
 //! A board must not spend a whole row's work in one line time, so the work is a small state machine:
 //! [`Build::advance`] does the next few columns of the present step. On a desktop one call does all.
 
-use super::RowTable;
+use super::{CUBICS, OFFSETS_PER_PX, QUADRATICS, RowTable};
 use crate::{
     band::{DERIVATIVE, HALFWAY, Level, MAX_HALF},
     kernel::{Kernel, MAX_COEFFICIENT},
@@ -469,9 +469,9 @@ impl Build {
             (0.0, 0.0)
         };
         table.px_per_product = 1.0 / slope;
-        table.offset_px = q[LAGS] / slope;
-        table.quadratic = rounded(a * 256.0);
-        table.cubic = rounded(b * 64.0);
+        table.offset = rounded(q[LAGS] / slope * OFFSETS_PER_PX);
+        table.quadratic = rounded(a * QUADRATICS);
+        table.cubic = rounded(b * CUBICS);
         table.information = (information.to_bits() >> 16) as u16;
         table
     }
@@ -492,6 +492,6 @@ fn correlation(recipe: &Recipe, mean: &[u16], coefficients: &[i8], lag: isize) -
     recipe.kernel.sums_u16(mean, coefficients).product as f32 / recipe.counts_per_value
 }
 
-fn rounded(v: f32) -> i8 {
-    libm::roundf(v).clamp(-127.0, 127.0) as i8
+fn rounded(v: f32) -> i16 {
+    libm::roundf(v).clamp(-32767.0, 32767.0) as i16
 }

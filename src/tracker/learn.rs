@@ -1,11 +1,6 @@
 //! Learning the reference, in two rounds of frames.
 
-use super::{
-    Found, Stage, Tracker,
-    follow::{Follow, move_row},
-    predict::Prediction,
-    watch::Watch,
-};
+use super::{Found, Stage, Tracker, follow::Follow, predict::Prediction, watch::Watch};
 use crate::{
     align,
     band::{Level, MAX_HALF},
@@ -66,6 +61,7 @@ impl Tracker<'_> {
         self.range_px = 0.0;
         self.to_reference = 1.0;
         self.prediction = Prediction::default();
+        self.blur.relearn();
         self.meter = NoiseMeter::default();
         self.watch = Watch::default();
         self.follow = Follow::default();
@@ -106,7 +102,8 @@ impl Tracker<'_> {
             }
             Stage::Tracking => {}
         }
-        self.prediction.end_round();
+        self.prediction.end_round(self.usual_information());
+        self.blur.end_round();
         self.meter = NoiseMeter::default();
         self.range_px = 0.0;
         self.frames_in_stage = 0;
@@ -134,22 +131,17 @@ impl Tracker<'_> {
         let Some(&seen) = self.storage.learning.get(row) else {
             return;
         };
-        let centre = match self.stage {
-            Stage::Rough => 0.0,
-            Stage::Refining | Stage::Tracking => seen.shift_px,
-        };
         if self.prediction.is_sure() {
-            let from_centre = self.prediction.at(row) - centre;
-            self.range_px = self.range_px.max(from_centre.abs());
+            self.range_px = self.range_px.max(self.prediction.at(row).abs());
         }
         if row.is_multiple_of(8) {
             self.note_activity(pixels);
         }
         // A row that reads black or white throughout would tell of too little noise.
         if textured && row % NOISE_ROWS == self.frames_in_stage as usize % NOISE_ROWS {
-            self.measure_noise(row, pixels, shift_px - centre, seen.frames);
+            self.measure_noise(row, pixels, shift_px, seen.frames);
         }
-        self.average(row, pixels, shift_px - centre, u16::MAX);
+        self.average(row, pixels, shift_px, u16::MAX);
         if self.stage == Stage::Rough {
             let frames = seen.frames.saturating_add(1);
             if let Some(l) = self.storage.learning.get_mut(row) {
@@ -255,21 +247,35 @@ impl Tracker<'_> {
         }
     }
 
-    /// Moves each row's reference by whole pixels to the middle of its motion: the first frame, to which
-    /// it is anchored, may have met the picture anywhere.
+    /// Moves each row's reference to the middle of its motion: the first frame, to which it is anchored,
+    /// may have met the picture anywhere, and elsewhere in the row beside.
     fn centre_rows(&mut self) {
         let width = usize::from(self.config.width);
-        let stride = i32::from(self.config.stride);
-        for (mean, learning) in self
-            .storage
-            .mean
-            .chunks_exact_mut(width)
-            .zip(self.storage.learning.iter_mut())
-        {
-            let by = super::nearest(learning.shift_px / stride as f32) * stride;
-            move_row(mean, by);
-            learning.shift_px -= by as f32;
+        let rows = self.storage.mean.chunks_exact_mut(width);
+        for (mean, learning) in rows.zip(self.storage.learning.iter_mut()) {
+            align::move_row_by(
+                mean,
+                learning.shift_px,
+                self.recipe.stride,
+                self.storage.scratch,
+            );
+            learning.shift_px = 0.0;
         }
+    }
+
+    /// Mean information of the rows with texture, 1/px².
+    fn usual_information(&self) -> f32 {
+        let rows = self
+            .storage
+            .tables
+            .iter()
+            .map(RowTable::information_per_px2);
+        let (sum, n) = rows
+            .filter(|&information| information > 0.0)
+            .fold((0.0f32, 0.0f32), |(sum, n), information| {
+                (sum + information, n + 1.0)
+            });
+        sum / n.max(1.0)
     }
 
     fn build_all(&mut self) {

@@ -9,6 +9,7 @@
 //! its reference (`watch.rs`); if not, it searches, and if that finds nothing either, the line is
 //! disturbed. The reference slowly follows the picture (`follow.rs`).
 
+mod blur;
 mod config;
 mod counts;
 mod flicker;
@@ -31,6 +32,7 @@ use crate::{
     reference::{Recipe, RowTable},
     timeline::Displacement,
 };
+use blur::Blur;
 use flicker::Flicker;
 use follow::Follow;
 use overlap::Overlap;
@@ -79,6 +81,7 @@ pub struct Tracker<'a> {
     /// T²/(12·line time): what a relative change of the light from row to row delays the exposure's mean
     /// time by, ns. 0 with a global shutter.
     ns_per_slope: f32,
+    blur: Blur,
     meter: NoiseMeter,
     /// Largest shift met in this round, px.
     range_px: f32,
@@ -134,6 +137,7 @@ impl<'a> Tracker<'a> {
             to_reference: 1.0,
             flicker: Flicker::default(),
             ns_per_slope: ns_per_slope(&config.timing),
+            blur: Blur::new(&config.timing),
             meter: NoiseMeter::default(),
             range_px: 0.0,
             watch: Watch::default(),
@@ -272,6 +276,9 @@ impl<'a> Tracker<'a> {
             if turn {
                 self.follow_row(row, pixels, shift_px);
             }
+        }
+        if self.prediction.is_swift() {
+            shift_px = self.unsmear(row, &table, pixels, shift_px);
         }
         if due && (shift_px - expected).abs() > JUMP_PX {
             self.prediction.jump(row, shift_px, information_per_px2);

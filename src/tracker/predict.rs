@@ -17,8 +17,12 @@ pub(super) struct Prediction {
     /// Shift from row to row, and its change from row to row, px; 0 where the motion is not swift.
     speed_px: f32,
     change_px: f32,
-    /// Rows added since nothing was known, up to 2.
+    /// Rows added since nothing was known, up to 3.
     known: u8,
+    /// Information of a row with texture, the mean over all, 1/px²; 0 until that is known.
+    usual_information: f32,
+    /// What the last row and the one before came to, px.
+    last_px: [f32; 2],
     /// The row that was added last.
     row: u16,
     /// Frames for which the motion still counts as swift.
@@ -46,6 +50,34 @@ impl Prediction {
         }
         let rows = f32::from((row as u16).saturating_sub(self.row).min(Self::ROWS));
         self.shift_px + rows * (self.speed_px + 0.5 * rows * self.change_px)
+    }
+
+    /// The motion is swift.
+    #[inline]
+    pub(super) fn is_swift(&self) -> bool {
+        self.swift_frames > 0
+    }
+
+    /// Speed at a row that is at `shift_px`, px a row, and how it changes from row to row. Good rows tell by
+    /// their differences, as the filter lags behind; where neither is sure of the speed it is 0.
+    pub(super) fn motion(&self, row: usize, shift_px: f32, information: f32) -> (f32, f32) {
+        let [last, before] = self.last_px;
+        let speed = 1.5 * shift_px - 2.0 * last + 0.5 * before;
+        let next = row == usize::from(self.row) + 1;
+        // Five standard deviations of the difference; of the filtered speed even more.
+        if next && self.known == 3 && speed * speed * information > 160.0 {
+            return (speed, shift_px - 2.0 * last + before);
+        }
+        if self.speed_px * self.speed_px * self.information > 20.0 {
+            return (self.speed_px, self.change_px);
+        }
+        (0.0, 0.0)
+    }
+
+    /// A swift picture must be found anew after a gap, and a row that knows so little could take any place
+    /// for it.
+    pub(super) fn needs_more_than(&self, information: f32) -> bool {
+        self.is_swift() && self.known == 0 && information < 0.25 * self.usual_information
     }
 
     /// It is sure to about a tenth of a pixel.
@@ -85,8 +117,9 @@ impl Prediction {
                     self.change_px += surprise * share * share * share;
                 }
             }
-            self.known = (self.known + 1).min(2);
+            self.known = (self.known + 1).min(3);
         }
+        self.last_px = [shift_px, self.last_px[0]];
         self.row = row as u16;
     }
 
@@ -117,9 +150,11 @@ impl Prediction {
     }
 
     /// A round of learning has ended: what is known of the motion stays, where the picture is does not.
-    pub(super) fn end_round(&mut self) {
+    /// `usual_information`: of a row with texture, 1/px².
+    pub(super) fn end_round(&mut self, usual_information: f32) {
         self.forget();
         self.gap.end_round();
+        self.usual_information = usual_information;
         self.shift_px = self.gap.expected_px();
     }
 

@@ -93,6 +93,9 @@ impl Tracker<'_> {
         pixels: &[P],
         shift_px: f32,
     ) -> Option<f32> {
+        if self.prediction.needs_more_than(table.information_per_px2()) {
+            return None;
+        }
         let mut fit = self.fits(row, pixels, shift_px).then_some(shift_px);
         if fit.is_none() && self.watch.rest == 0 {
             self.watch.rest = 8;
