@@ -149,8 +149,13 @@ fn line_time_s(
     } else if let Some((seconds, who)) = facts.line_time {
         (seconds, who.to_owned())
     } else if let Some(mode) = sensor::lookup(&facts.id, facts.shape.width, facts.shape.height) {
-        let from = "the sensor table: kernels differ, calibrate to be sure".to_owned();
-        (f64::from(mode.line_time_ps) * 1e-12, from)
+        let (seconds, certain) = mode.line_time_s(facts.shortest_frame_s);
+        let why = match certain {
+            true => "which fits the camera's shortest frame",
+            false => "and nothing confirms it",
+        };
+        let from = format!("the sensor table, {why}: calibrate to be sure");
+        (seconds, from)
     } else {
         let camera = facts.id.clone();
         return Err(SetupError::NoLineTime { camera });
@@ -226,6 +231,7 @@ mod tests {
             },
             line_time,
             frame_period_ns: Some(8_330_000),
+            shortest_frame_s: Some(8_330e-6),
             reasons: String::new(),
         }
     }
@@ -235,8 +241,8 @@ mod tests {
         let config = Config::defaults();
         let setup = |facts: &Facts, config: &Config| Setup::new(facts, config, &config.settings);
         let table = setup(&facts("imx477", None), &config).unwrap();
-        assert_eq!(table.tracker.timing.line_time_ps(), 7_933_000);
-        assert!(table.remarks[0].contains("calibrate"));
+        assert_eq!(table.tracker.timing.line_time_ps(), 7_933_333);
+        assert!(table.remarks[0].contains("fits the camera's shortest frame: calibrate"));
         let driver = setup(&facts("imx477", Some((8e-6, "the driver"))), &config).unwrap();
         assert_eq!(driver.tracker.timing.line_time_ps(), 8_000_000);
         assert!(matches!(
@@ -254,7 +260,7 @@ mod tests {
         let config = Config::parse("[camera]\nroi = [6, 100, 640, 200]", "f").unwrap();
         let setup = Setup::new(&facts("imx477", None), &config, &config.settings).unwrap();
         assert_eq!((setup.part.x, setup.part.width), (4, 640));
-        assert_eq!(setup.part_start_ns, 793_300);
+        assert_eq!(setup.part_start_ns, 793_333);
         assert_eq!(setup.group.timing().rows(), 200);
         let config = Config::parse("[camera]\nroi = [1000, 0, 640, 200]", "f").unwrap();
         let error = Setup::new(&facts("imx477", None), &config, &config.settings).unwrap_err();

@@ -54,6 +54,8 @@ pub struct Facts {
     pub line_time: Option<(f64, &'static str)>,
     /// From one frame to the next, ns.
     pub frame_period_ns: Option<i64>,
+    /// The shortest frame that this mode allows, s.
+    pub shortest_frame_s: Option<f64>,
     /// Why this mode; one line each.
     pub reasons: String,
 }

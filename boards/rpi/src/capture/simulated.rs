@@ -115,6 +115,7 @@ impl Simulated {
                 shape,
                 line_time: Some((scene.line_time_s, "the simulation")),
                 frame_period_ns: Some(scene.frame_period_ns),
+                shortest_frame_s: None,
                 reasons: String::new(),
             },
             scene,

@@ -8,6 +8,10 @@ use std::fs::File;
 use std::os::fd::AsRawFd;
 use std::path::Path;
 
+use crate::sensor::mended_pixel_rate_hz;
+
+const MENDED: &str = "the sensor's driver, its pixel rate of 55 MHz mended to 58.333 MHz";
+
 const CID_HBLANK: u32 = 0x009e_0902;
 const CID_PIXEL_RATE: u32 = 0x009f_0902;
 
@@ -35,9 +39,9 @@ struct Controls {
 /// `VIDIOC_G_EXT_CTRLS`: _IOWR('V', 71, struct v4l2_ext_controls).
 const G_EXT_CTRLS: u64 = 3 << 30 | (size_of::<Controls>() as u64) << 16 | (b'V' as u64) << 8 | 71;
 
-/// Line time of the sensor whose driver's name is part of `camera_id`, in the mode that is `width` wide, s.
-/// `None` where the driver does not say.
-pub(super) fn line_time_s(camera_id: &str, width: u32) -> Option<f64> {
+/// Line time of the sensor whose driver's name is part of `camera_id`, in the mode that is `width` wide and set up, s,
+/// and who says so. `None` where the driver does not say.
+pub(super) fn line_time_s(camera_id: &str, width: u32) -> Option<(f64, &'static str)> {
     let folder = Path::new("/sys/class/video4linux");
     for entry in std::fs::read_dir(folder).ok()?.flatten() {
         let Ok(name) = std::fs::read_to_string(entry.path().join("name")) else {
@@ -45,7 +49,8 @@ pub(super) fn line_time_s(camera_id: &str, width: u32) -> Option<f64> {
         };
         // "imx219 10-0010": the driver, bus and address.
         let driver = name.split_whitespace().next().unwrap_or_default();
-        if driver.is_empty() || !camera_id.contains(driver) {
+        let node = std::fs::canonicalize(entry.path().join("device/of_node")).ok();
+        if !is_of(camera_id, driver, node.as_deref()) {
             continue;
         }
         let Ok(device) = File::open(Path::new("/dev").join(entry.file_name())) else {
@@ -56,10 +61,22 @@ pub(super) fn line_time_s(camera_id: &str, width: u32) -> Option<f64> {
             continue;
         };
         if rate > 0 && blank >= 0 {
-            return Some((f64::from(width) + blank as f64) / rate as f64);
+            let clocks = f64::from(width) + blank as f64;
+            return Some(match mended_pixel_rate_hz(driver, rate) {
+                Some(rate) => (clocks / rate as f64, MENDED),
+                None => (clocks / rate as f64, "the sensor's driver"),
+            });
         }
     }
     None
+}
+
+/// The sub-device is the camera's: it has the camera's node in the device tree (two cameras may be of one kind), or,
+/// where there is no device tree, its driver's name.
+fn is_of(camera_id: &str, driver: &str, node: Option<&Path>) -> bool {
+    !driver.is_empty()
+        && camera_id.contains(driver)
+        && node.is_none_or(|node| node.to_string_lossy().ends_with(camera_id))
 }
 
 fn read(device: &File, id: u32) -> Option<i64> {
@@ -97,6 +114,18 @@ mod tests {
         assert_eq!(size_of::<Control>(), 20);
         #[cfg(target_pointer_width = "64")]
         assert_eq!(G_EXT_CTRLS, 0xc020_5647);
+    }
+
+    #[test]
+    fn of_two_equal_cameras_the_right_one_is_asked() {
+        let id = "/base/axi/pcie@120000/rp1/i2c@88000/imx219@10";
+        let node = |bus: &str| {
+            let base = "/sys/firmware/devicetree/base/axi/pcie@120000/rp1";
+            Path::new(base).join(bus).join("imx219@10")
+        };
+        assert!(is_of(id, "imx219", Some(&node("i2c@88000"))));
+        assert!(!is_of(id, "imx219", Some(&node("i2c@80000"))));
+        assert!(is_of(id, "imx219", None) && !is_of(id, "imx477", None) && !is_of(id, "", None));
     }
 
     #[test]
