@@ -10,6 +10,7 @@
 mod aarch64;
 #[cfg(all(target_arch = "arm", any(target_feature = "dsp", rowtone_dsp)))]
 mod cortex_m;
+pub(crate) mod gather;
 mod portable;
 #[cfg(target_arch = "x86_64")]
 mod x86_64;

@@ -4,6 +4,7 @@
 
 use rowtone::analyzer::Collector;
 use rowtone::camera::{Line, Pixels};
+use rowtone::kernel::Kernel;
 use rowtone::report::{Warning, Warnings};
 use rowtone::spectrum::{self, SampleBuffer};
 use rowtone::timeline::Binner;
@@ -22,8 +23,10 @@ pub struct Lines<'a> {
     collector: Collector<'a>,
     clock: FrameClock,
     light: Light,
-    /// Where packed rows are unpacked to.
+    /// Where rows of more than 8 bits are unpacked to, or their upper bytes.
     words: Vec<u16>,
+    upper: Vec<u8>,
+    kernel: Kernel,
     /// Bytes of a whole frame.
     frame_bytes: usize,
     /// As they were when the last window was complete.
@@ -117,6 +120,8 @@ impl<'a> Lines<'a> {
                 saturated: 0.0,
             },
             words: vec![0; setup.part.width.into()],
+            upper: vec![0; setup.part.width.into()],
+            kernel: Kernel::detect(),
             frame_bytes: last_row * shape.stride + line_end,
             told: Counts::default(),
             setup,
@@ -139,16 +144,23 @@ impl<'a> Lines<'a> {
         } = self.setup;
         let start_ns = due.start_ns.saturating_add(self.setup.part_start_ns);
         let width = usize::from(part.width);
+        let bits = self.setup.tracker.bits;
         let first = usize::from(part.y) * shape.stride + shape.format.bytes(part.x.into());
         let looked_at = (due.number % u32::from(part.height)) as u16;
         for row in 0..part.height {
             let at = first + usize::from(row) * shape.stride;
             let bytes = frame.bytes.get(at..).unwrap_or_default();
-            let Ok(pixels) = shape.format.line(bytes, width, &mut self.words) else {
+            let pixels = if bits == 8 {
+                let upper = &mut self.upper;
+                shape.format.upper_line(self.kernel, bytes, width, upper)
+            } else {
+                shape.format.line(bytes, width, &mut self.words)
+            };
+            let Ok(pixels) = pixels else {
                 return; // `whole` rules it out
             };
             if row == looked_at {
-                self.light.add(Light::of(pixels, shape.format.bits()));
+                self.light.add(Light::of(pixels, bits));
             }
             let line = Line {
                 frame: due.number,

@@ -107,7 +107,10 @@ impl Setup {
         let rows = rows_per_sample(timing, highest_hz, frames as u32, WINDOW_SAMPLES);
         let group = Group::new(timing, rows).map_err(SetupError::Group)?;
         let tracker = tracker::Config {
-            bits: shape.format.bits(),
+            bits: match config.camera.full_depth {
+                true => shape.format.bits(),
+                false => 8,
+            },
             stride: if shape.bayer { 2 } else { 1 },
             learn_frames: config.camera.learn_frames,
             ..tracker::Config::new(timing, part.width)
@@ -252,7 +255,10 @@ mod tests {
         let given = Config::parse("[camera]\nline_time_us = 9.5", "f").unwrap();
         let setup = setup(&facts("virtual", None), &given).unwrap();
         assert_eq!(setup.tracker.timing.line_time_ps(), 9_500_000);
-        assert_eq!((setup.tracker.bits, setup.tracker.stride), (10, 2));
+        assert_eq!((setup.tracker.bits, setup.tracker.stride), (8, 2));
+        let deep = Config::parse("[camera]\nfull_depth = true", "f").unwrap();
+        let setup = Setup::new(&facts("imx477", None), &deep, &deep.settings).unwrap();
+        assert_eq!(setup.tracker.bits, 10);
     }
 
     #[test]

@@ -34,6 +34,8 @@ pub struct CameraConfig {
     pub mode: Wish,
     /// Rows as the sensor gives them, or luma of the image processor.
     pub stream: StreamWish,
+    /// Of pixels of more than 8 bits all bits, not only the upper 8.
+    pub full_depth: bool,
     /// Frame rate, Hz; the fastest where there is none.
     pub frame_rate_hz: Option<f64>,
     /// Exposure of a row, µs; by the highest frequency where there is none.
@@ -100,6 +102,7 @@ impl Config {
                 id: None,
                 mode: Wish::Auto,
                 stream: StreamWish::Raw,
+                full_depth: false,
                 frame_rate_hz: None,
                 exposure_us: None,
                 gain: 4.0,
