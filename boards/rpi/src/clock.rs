@@ -33,10 +33,15 @@ pub struct Due {
 #[derive(Clone, Debug, Default)]
 pub struct FrameClock {
     replay: Option<Replay>,
-    /// Wanted from one frame to the next, ns.
-    period_ns: Option<i64>,
+    /// Wanted from one frame to the next, ns: now, and before the last change.
+    periods_ns: [Option<i64>; 2],
     last: Option<Last>,
     counts: FrameCounts,
+}
+
+/// How far from a whole number.
+fn off(periods: f64) -> f64 {
+    (periods - periods.round()).abs()
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -50,7 +55,7 @@ impl FrameClock {
     pub fn new(replay: Option<Replay>, period_ns: Option<i64>) -> Self {
         Self {
             replay,
-            period_ns: period_ns.filter(|&ns| ns > 0),
+            periods_ns: [period_ns.filter(|&ns| ns > 0), None],
             last: None,
             counts: FrameCounts::default(),
         }
@@ -61,9 +66,19 @@ impl FrameClock {
         self.counts
     }
 
-    /// The camera was asked for another frame rate.
+    /// The camera was asked for another frame rate; some frames may still come at the one before.
     pub fn set_period(&mut self, period_ns: i64) {
-        self.period_ns = Some(period_ns).filter(|&ns| ns > 0);
+        if period_ns > 0 && self.periods_ns[0] != Some(period_ns) {
+            self.periods_ns = [Some(period_ns), self.periods_ns[0]];
+        }
+    }
+
+    /// How many periods so long a time is, by the frame rate that it fits best.
+    fn periods(&self, after_ns: i64) -> Option<f64> {
+        let periods = self.periods_ns.iter().flatten();
+        periods
+            .map(|&ns| after_ns as f64 / ns as f64)
+            .min_by(|a, b| off(*a).total_cmp(&off(*b)))
     }
 
     /// What to do with a frame of which `complete` says whether all its rows are there; `None`: leave it out.
@@ -85,12 +100,9 @@ impl FrameClock {
                     self.counts.corrupt += 1;
                     return None;
                 }
-                let periods = self.period_ns.map_or(1.0, |p| after_ns as f64 / p as f64);
-                let ahead = counted.max(periods.round().clamp(1.0, 1e6) as u32);
-                if (periods - periods.round()).abs() > 0.1 && self.period_ns.is_some() {
-                    self.counts.late += 1;
-                }
-                ahead
+                let periods = self.periods(after_ns).unwrap_or(1.0);
+                self.counts.late += u64::from(off(periods) > 0.1);
+                counted.max(periods.round().clamp(1.0, 1e6) as u32)
             }
         };
         Some(self.take(frame.sequence, ahead, start_ns))
@@ -151,6 +163,29 @@ mod tests {
         let counts = clock.counts();
         assert_eq!((counts.good, counts.lost), (5, 3));
         assert_eq!((counts.late, counts.corrupt), (1, 2));
+    }
+
+    #[test]
+    fn frames_at_the_rate_before_are_not_late() {
+        let mut clock = FrameClock::new(None, Some(10_000));
+        let mut start_ns = 0;
+        for (sequence, period_ns) in [10_000, 10_000, 12_500, 12_500, 10_000].iter().enumerate() {
+            clock.set_period(if sequence < 2 { 10_000 } else { 12_500 });
+            assert!(
+                clock
+                    .frame(&frame(sequence as u32, start_ns), true)
+                    .is_some()
+            );
+            start_ns += period_ns;
+        }
+        assert_eq!((clock.counts().late, clock.counts().lost), (0, 0));
+        // Two of the new ones lost, and not counted by the camera.
+        start_ns += 2 * 12_500;
+        assert_eq!(
+            clock.frame(&frame(5, start_ns), true).map(|d| d.number),
+            Some(7)
+        );
+        assert_eq!(clock.counts().lost, 2);
     }
 
     #[test]

@@ -12,13 +12,15 @@ use std::time::{Duration, Instant};
 use rowtone::analyzer::{Collector, Reporter};
 use rowtone::report::{Report, Warnings};
 use rowtone::settings::Settings;
+use rowtone::spectrum::FrameRatePlan;
 
 use crate::capture::{CameraError, Source};
 use crate::clock::{FrameClock, FrameCounts};
-use crate::config::Config;
+use crate::config::{Config, USUAL_HIGHEST_HZ};
 use crate::lines::{Lines, LinesError};
 use crate::memory::{SpectrumMemory, TrackerMemory};
 use crate::notify::Notifier;
+use crate::run::log;
 use crate::setup::Setup;
 
 /// What all threads share.
@@ -96,6 +98,7 @@ pub fn run(
     let reporter = Mutex::new(reporter.map_err(LinesError::Spectrum)?);
     let period_ns = source.facts().frame_period_ns;
     let clock = FrameClock::new(config.camera.replay, period_ns);
+    let mut rates = FrameRates::new(setup, config, period_ns);
     let mut lines = Lines::new(setup, clock, tracker_memory.lend(), storage.collected)?;
     let (ready, windows) = sync_channel(1);
     let ended = std::thread::scope(|scope| {
@@ -117,7 +120,14 @@ pub fn run(
             offset_ms: None,
             last: false,
         };
-        let ended = lines_until_end(source, &mut lines, &mut handover, config, notifier);
+        let ended = lines_until_end(
+            source,
+            &mut lines,
+            &mut rates,
+            &mut handover,
+            config,
+            notifier,
+        );
         // The last window is worth waiting for.
         handover.last = true;
         lines.finish(&mut |collector, warnings| handover.give(collector, warnings));
@@ -129,6 +139,7 @@ pub fn run(
 fn lines_until_end(
     source: &mut dyn Source,
     lines: &mut Lines<'_>,
+    rates: &mut FrameRates,
     handover: &mut Handover<'_, '_>,
     config: &Config,
     notifier: &Notifier,
@@ -147,13 +158,21 @@ fn lines_until_end(
         if shared.changes.load(Ordering::Acquire) != changes {
             return Ended::Changed;
         }
+        let mut start_ns = None;
         let outcome = source.next(patience, &mut |frame| {
+            start_ns = frame.start_ns;
             lines.frame(&frame, &mut |collector, warnings| {
                 handover.give(collector, warnings);
             });
         });
         match outcome {
-            Ok(()) => heard = Instant::now(),
+            Ok(()) => {
+                heard = Instant::now();
+                if let Some(period_ns) = rates.wanted(start_ns) {
+                    source.set_frame_period(period_ns);
+                    lines.clock().set_period(period_ns);
+                }
+            }
             Err(CameraError::Silent(_)) if heard.elapsed() < silence => {}
             Err(CameraError::Silent(_)) => {
                 return Ended::Camera(CameraError::Silent(heard.elapsed()));
@@ -161,6 +180,47 @@ fn lines_until_end(
             Err(error) => return Ended::Camera(error),
         }
         alive.tell();
+    }
+}
+
+/// Asks for the frame rates of the core's plan, where it is to be followed.
+#[derive(Debug)]
+struct FrameRates {
+    plan: Option<FrameRatePlan>,
+    /// Start of the first frame, ns.
+    began_ns: Option<i64>,
+    /// As asked for last, Hz.
+    fps: Option<f32>,
+}
+
+impl FrameRates {
+    fn new(setup: &Setup, config: &Config, period_ns: Option<i64>) -> Self {
+        let max_fps = period_ns.map_or(0.0, |ns| 1e9 / ns.max(1) as f32);
+        let wanted = config.camera.two_frame_rates && config.camera.replay.is_none();
+        let plan = wanted.then(|| {
+            let window_s = setup.spectrum.window_ns as f32 * 1e-9;
+            let highest_hz = setup.spectrum.max_hz.unwrap_or(USUAL_HIGHEST_HZ);
+            FrameRatePlan::new(max_fps, window_s, highest_hz)
+        });
+        let plan = plan.and_then(|plan| {
+            plan.inspect_err(|e| log(&format!("camera.two_frame_rates: {e}")))
+                .ok()
+        });
+        Self {
+            plan,
+            began_ns: None,
+            // A session before this one may have left the camera at the other rate.
+            fps: None,
+        }
+    }
+
+    /// Another frame period to ask for, ns, now that a frame began at this time.
+    fn wanted(&mut self, start_ns: Option<i64>) -> Option<i64> {
+        let (plan, start_ns) = (self.plan?, start_ns?);
+        let began_ns = *self.began_ns.get_or_insert(start_ns);
+        let fps = plan.fps(start_ns.saturating_sub(began_ns) as f32 * 1e-9);
+        let before = self.fps.replace(fps);
+        (before != Some(fps)).then(|| (1e9 / f64::from(fps)).round() as i64)
     }
 }
 

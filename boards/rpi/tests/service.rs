@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use rowtone::report::{Report, Warning};
 use rowtone::wire::{Message, text};
-use rowtone_rpi::capture::simulated::{Scene, Simulated};
+use rowtone_rpi::capture::simulated::{Scene, Simulated, Tone};
 use rowtone_rpi::capture::{CameraError, Source};
 use rowtone_rpi::clock::FrameClock;
 use rowtone_rpi::config::Config;
@@ -165,6 +165,109 @@ fn a_camera_that_fails_is_opened_anew_and_nothing_stops() {
     assert!(reports.iter().any(|r| lossy(&r)), "lost frames are said");
     for report in reports.iter().filter(|r| r.window_s > 0.9) {
         assert!(is_right(report), "{report:?}");
+    }
+}
+
+/// Opens like [`a_camera_that_fails_is_opened_anew_and_nothing_stops`]'s, but the camera is there and falls silent.
+#[test]
+fn a_camera_that_falls_silent_is_opened_anew() {
+    let (mut ours, _theirs, name) = terminal();
+    let mut config = config(&name, "");
+    config.service.silence_s = 0.3;
+    let shared = Shared::new(config.settings);
+    let opened = Mutex::new(Vec::new());
+    let mut open = |_: &Config| -> Result<Box<dyn Source>, CameraError> {
+        opened.lock().unwrap().push(Instant::now());
+        Ok(Box::new(Simulated::new(Scene {
+            stuck_after: Some(150),
+            ..scene()
+        })))
+    };
+    let heard = std::thread::scope(|scope| {
+        let listener = scope.spawn(|| {
+            let heard = listen(
+                &mut ours,
+                |m| matches!(m, Message::Report { report, .. } if report.seq >= 5),
+            );
+            shared.stop.store(true, Ordering::Relaxed);
+            heard
+        });
+        run::run(&config, &shared, &mut open).unwrap();
+        listener.join().unwrap()
+    });
+    let opened = opened.into_inner().unwrap();
+    assert!(opened.len() >= 2, "{opened:?}");
+    for pair in opened.windows(2) {
+        // Silence first, then the shortest wait: it had worked in between.
+        assert!(
+            pair[1] - pair[0] >= Duration::from_millis(800),
+            "{opened:?}"
+        );
+    }
+    let full = |r: &&Report| r.window_s > 0.9;
+    assert!(reports(&heard).iter().filter(full).all(is_right));
+}
+
+#[test]
+fn a_camera_that_never_works_is_tried_at_longer_and_longer_intervals() {
+    let config = config("/nonexistent/port", "");
+    let shared = Shared::new(config.settings);
+    let mut opened = Vec::new();
+    let mut open = |_: &Config| -> Result<Box<dyn Source>, CameraError> {
+        opened.push(Instant::now());
+        shared.stop.store(opened.len() == 4, Ordering::Relaxed);
+        Err(CameraError::Refused("it is in use".to_owned()))
+    };
+    run::run(&config, &shared, &mut open).unwrap();
+    let waits: Vec<_> = opened
+        .windows(2)
+        .map(|w| (w[1] - w[0]).as_secs_f64())
+        .collect();
+    for (wait, least) in waits.iter().zip([0.5, 1.0, 2.0]) {
+        assert!(*wait >= least, "{waits:?}");
+    }
+    assert_eq!(opened.len(), 4);
+}
+
+/// At one frame rate a tone at its double stands still in the picture; at two it moves.
+#[test]
+fn two_frame_rates_show_what_hides_at_a_multiple_of_one() {
+    let hears = |two: bool| {
+        let (mut ours, _theirs, name) = terminal();
+        let config = config(&name, &format!("two_frame_rates = {two}"));
+        let shared = Shared::new(config.settings);
+        let mut open = |_: &Config| -> Result<Box<dyn Source>, CameraError> {
+            let scene = scene();
+            let hidden = Tone {
+                hz: 2e9 / scene.frame_period_ns as f64,
+                px: 0.3,
+            };
+            let tones = vec![hidden, Tone { hz: 97.3, px: 0.4 }];
+            Ok(Box::new(Simulated::new(Scene { tones, ..scene })))
+        };
+        std::thread::scope(|scope| {
+            let service = scope.spawn(|| run::run(&config, &shared, &mut open).unwrap());
+            let heard = listen(
+                &mut ours,
+                |m| matches!(m, Message::Report { report, .. } if report.seq >= 5),
+            );
+            shared.stop.store(true, Ordering::Relaxed);
+            service.join().unwrap();
+            reports(&heard).pop().unwrap()
+        })
+    };
+    let px_at = |report: &Report, hz: f32| {
+        let near = report.peaks.iter().find(|p| (p.hz - hz).abs() < 0.2);
+        near.map(|p| p.amplitude_px)
+    };
+    let (one, two) = (hears(false), hears(true));
+    assert_eq!(px_at(&one, 120.0), None, "{one:?}");
+    let found = px_at(&two, 120.0).expect("the hidden tone");
+    assert!((found - 0.3).abs() < 0.03, "{two:?}");
+    for report in [&one, &two] {
+        let found = px_at(report, 97.3).expect("the other tone");
+        assert!((found - 0.4).abs() < 0.04, "{report:?}");
+        assert_eq!(report.lost_frames, 0, "{report:?}");
     }
 }
 

@@ -34,6 +34,8 @@ pub struct Scene {
     pub tones: Vec<Tone>,
     /// Frames after which the camera is gone; never where there is none.
     pub frames: Option<u32>,
+    /// Frames after which the camera is there and gives no more; never where there is none.
+    pub stuck_after: Option<u32>,
     /// Every so many frames one is lost; never where there is none.
     pub lose_every: Option<u32>,
     /// Every so many frames one is corrupt; never where there is none.
@@ -52,6 +54,7 @@ impl Default for Scene {
             frame_period_ns: 16_666_667,
             tones: vec![Tone { hz: 97.3, px: 0.4 }, Tone { hz: 211.7, px: 0.1 }],
             frames: None,
+            stuck_after: None,
             lose_every: None,
             spoil_every: None,
             paced: true,
@@ -75,17 +78,41 @@ impl Scene {
             let d = self.shift_px(time_s);
             // Three waves whose phases differ from row to row: nothing a row could be confused with.
             let row = f64::from(y);
-            for x in 0..self.width {
-                let u = f64::from(x) - d;
-                let light = 120.0
-                    + 45.0 * (TAU * u / 13.7 + 0.9 * row).sin()
-                    + 30.0 * (TAU * u / 29.3 - 0.31 * row).sin()
-                    + 20.0 * (TAU * u / 8.9 + 1.7 * row).cos();
+            let mut waves = [
+                Wave::new(45.0, 13.7, 0.9 * row, d),
+                Wave::new(30.0, 29.3, -0.31 * row, d),
+                Wave::new(20.0, 8.9, 1.7 * row + TAU / 4.0, d),
+            ];
+            for _ in 0..self.width {
+                let light = 120.0 + waves.iter_mut().map(Wave::next).sum::<f64>();
                 noise = noise.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
                 let dither = f64::from(noise >> 8) / f64::from(1u32 << 24);
                 to.push((light + dither) as u8);
             }
         }
+    }
+}
+
+/// A sine along a row, pixel by pixel: a pointer that turns, for a sine each would take most of the time.
+struct Wave {
+    height: f64,
+    at: (f64, f64),
+    turn: (f64, f64),
+}
+
+impl Wave {
+    fn new(height: f64, length_px: f64, phase: f64, shift_px: f64) -> Self {
+        Self {
+            height,
+            at: (phase - TAU * shift_px / length_px).sin_cos(),
+            turn: (TAU / length_px).sin_cos(),
+        }
+    }
+
+    fn next(&mut self) -> f64 {
+        let ((sin, cos), (ds, dc)) = (self.at, self.turn);
+        self.at = (sin * dc + cos * ds, cos * dc - sin * ds);
+        self.height * sin
     }
 }
 
@@ -97,7 +124,12 @@ pub struct Simulated {
     sequence: u32,
     start_ns: i64,
     bytes: Vec<u8>,
+    /// A frame period asked for, and from which frame on it holds.
+    asked: Option<(u32, i64)>,
 }
+
+/// Frames that still come at the rate before, as sensors have it.
+const RATE_DELAY: u32 = 3;
 
 impl Simulated {
     /// A camera that starts at frame 0.
@@ -122,6 +154,7 @@ impl Simulated {
             sequence: 0,
             start_ns: 0,
             bytes: Vec::new(),
+            asked: None,
         }
     }
 }
@@ -133,7 +166,7 @@ impl Source for Simulated {
 
     fn next(
         &mut self,
-        _patience: Duration,
+        patience: Duration,
         take: &mut dyn FnMut(Frame<'_>),
     ) -> Result<(), CameraError> {
         if self
@@ -142,6 +175,16 @@ impl Source for Simulated {
             .is_some_and(|frames| self.sequence >= frames)
         {
             return Err(CameraError::Gone);
+        }
+        if self.scene.stuck_after.is_some_and(|n| self.sequence >= n) {
+            std::thread::sleep(patience);
+            return Err(CameraError::Silent(patience));
+        }
+        if let Some((from, period_ns)) = self.asked
+            && self.sequence >= from
+        {
+            self.scene.frame_period_ns = period_ns;
+            self.asked = None;
         }
         if self.scene.paced {
             std::thread::sleep(Duration::from_nanos(self.scene.frame_period_ns as u64));
@@ -167,6 +210,6 @@ impl Source for Simulated {
     }
 
     fn set_frame_period(&mut self, period_ns: i64) {
-        self.scene.frame_period_ns = period_ns;
+        self.asked = Some((self.sequence.saturating_add(RATE_DELAY), period_ns));
     }
 }

@@ -30,6 +30,7 @@ struct Camera {
     stream: Maybe<String>,
     full_depth: Maybe<bool>,
     frame_rate_hz: Maybe<f64>,
+    two_frame_rates: Maybe<bool>,
     exposure_us: Maybe<u32>,
     gain: Maybe<f64>,
     roi: Maybe<[u16; 4]>,
@@ -167,6 +168,7 @@ impl Reader<'_> {
             self.number("camera.frame_rate_hz", &file.frame_rate_hz, 1.0..=2000.0)?;
         let switch = |value: &Maybe<bool>| value.as_ref().is_some_and(|v| *v.get_ref());
         camera.full_depth = switch(&file.full_depth);
+        camera.two_frame_rates = switch(&file.two_frame_rates);
         camera.exposure_us = self.number("camera.exposure_us", &file.exposure_us, 1..=1_000_000)?;
         let gain = self.number("camera.gain", &file.gain, 1.0..=64.0)?;
         camera.gain = gain.map_or(camera.gain, |gain| gain as f32);

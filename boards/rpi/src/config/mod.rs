@@ -38,6 +38,8 @@ pub struct CameraConfig {
     pub full_depth: bool,
     /// Frame rate, Hz; the fastest where there is none.
     pub frame_rate_hz: Option<f64>,
+    /// Alternate between two frame rates, so that no frequency hides at a multiple of one.
+    pub two_frame_rates: bool,
     /// Exposure of a row, µs; by the highest frequency where there is none.
     pub exposure_us: Option<u32>,
     /// Analogue gain.
@@ -104,6 +106,7 @@ impl Config {
                 stream: StreamWish::Raw,
                 full_depth: false,
                 frame_rate_hz: None,
+                two_frame_rates: false,
                 exposure_us: None,
                 gain: 4.0,
                 line_time_s: None,

@@ -1,0 +1,200 @@
+//! The program itself, on its simulated camera: its exit status, its last report, its memory, what it says.
+//!
+//! `ROWTONE_PROGRAM` may name another build of it, words before it included: `qemu-aarch64-static … rowtone-rpi`.
+
+use std::fs;
+use std::io::Read;
+use std::path::PathBuf;
+use std::process::{Child, Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+use rowtone::report::Report;
+use rowtone::wire::{Message, text};
+use serialport::{SerialPort, TTYPort};
+
+/// The program, ended when the test fails.
+struct Program(Child);
+
+impl Drop for Program {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// The program to test.
+fn command() -> Command {
+    let other = std::env::var("ROWTONE_PROGRAM").unwrap_or_default();
+    let mut words = other.split_whitespace();
+    let mut command = Command::new(words.next().unwrap_or(env!("CARGO_BIN_EXE_rowtone-rpi")));
+    command.args(words);
+    command
+}
+
+/// A configuration file of this test's own.
+fn file(name: &str, text: &str) -> PathBuf {
+    let name = format!("rowtone-rpi-{name}-{}.toml", std::process::id());
+    let path = std::env::temp_dir().join(name);
+    fs::write(&path, text).unwrap();
+    path
+}
+
+/// The program with its camera simulated and its line on a pseudo-terminal, of which our end and the other (to be
+/// kept, or the terminal hangs up) are given back.
+fn start(name: &str, measure: &str) -> (Program, TTYPort, TTYPort) {
+    let (mut ours, theirs) = TTYPort::pair().unwrap();
+    ours.set_timeout(Duration::from_millis(20)).unwrap();
+    let config = file(
+        name,
+        &format!(
+            "[camera]\nlearn_frames = 8\nexposure_us = 1\n[measure]\n{measure}\n\
+             [service]\nrealtime_priority = 0\nstate = \"/nonexistent/state\"\n"
+        ),
+    );
+    let child = command()
+        .args([
+            "--simulate",
+            "--output",
+            &theirs.name().unwrap(),
+            "--config",
+        ])
+        .arg(&config)
+        .stderr(Stdio::piped())
+        .spawn();
+    (Program(child.unwrap()), ours, theirs)
+}
+
+/// Reports from a port, one by one.
+struct Reports<'a> {
+    port: &'a mut TTYPort,
+    decoder: text::Decoder<{ text::MAX_LINE }>,
+    ready: Vec<Report>,
+}
+
+impl<'a> Reports<'a> {
+    fn new(port: &'a mut TTYPort) -> Self {
+        Self {
+            port,
+            decoder: text::Decoder::new(),
+            ready: Vec::new(),
+        }
+    }
+
+    /// The next one, within so long.
+    fn next(&mut self, within: Duration) -> Option<Report> {
+        let began = Instant::now();
+        let mut bytes = [0; 512];
+        while self.ready.is_empty() && began.elapsed() < within {
+            let count = self.port.read(&mut bytes).unwrap_or(0);
+            for &byte in &bytes[..count] {
+                if let Some(message) = self.decoder.push(byte)
+                    && let Message::Report { report, .. } = message.expect("every line is intact")
+                {
+                    self.ready.push(report);
+                }
+            }
+        }
+        (!self.ready.is_empty()).then(|| self.ready.remove(0))
+    }
+}
+
+fn terminate(program: &Program) {
+    let id = program.0.id().to_string();
+    let sent = Command::new("kill").args(["-TERM", &id]).status().unwrap();
+    assert!(sent.success());
+}
+
+#[test]
+fn sigterm_in_the_middle_of_a_window_sends_what_was_measured_and_exits_with_0() {
+    let (mut program, mut ours, _theirs) = start("sigterm", "window_s = 1.0\nhop_s = 1.0");
+    let mut reports = Reports::new(&mut ours);
+    let patience = Duration::from_secs(30);
+    reports.next(patience).expect("a first report");
+    let began = Instant::now();
+    let second = reports.next(patience).expect("a second report");
+    // The simulation takes its time where the machine is busy: wait for two thirds of a window of its own time.
+    std::thread::sleep(began.elapsed().mul_f64(0.67));
+    let asked = Instant::now();
+    terminate(&program);
+    let last = reports.next(patience).expect("a last report");
+    // The next whole window would have ended 1 s after the second.
+    let after_ms = last.time_ms - second.time_ms;
+    assert!((400..950).contains(&after_ms), "{after_ms} ms");
+    assert_eq!(last.seq, second.seq + 1);
+    for hz in [97.3, 211.7] {
+        assert!(
+            last.peaks.iter().any(|p| (p.hz - hz).abs() < 0.5),
+            "{last:?}"
+        );
+    }
+    let status = program.0.wait().unwrap();
+    assert!(asked.elapsed() < Duration::from_secs(5));
+    assert_eq!(status.code(), Some(0));
+    let mut said = String::new();
+    let stderr = program.0.stderr.take();
+    stderr.unwrap().read_to_string(&mut said).unwrap();
+    assert!(said.contains("ended after"), "{said}");
+    assert!(reports.next(Duration::from_millis(100)).is_none());
+}
+
+/// Memory of the process that is in use, KiB.
+fn resident_kib(program: &Program) -> u64 {
+    let status = fs::read_to_string(format!("/proc/{}/status", program.0.id())).unwrap();
+    let line = status.lines().find(|line| line.starts_with("VmRSS:"));
+    let words = line.unwrap().split_whitespace();
+    words.take(2).last().unwrap().parse().unwrap()
+}
+
+#[test]
+fn memory_does_not_grow_once_reports_flow() {
+    let (program, mut ours, _theirs) = start("memory", "window_s = 0.2\nhop_s = 0.05");
+    let mut reports = Reports::new(&mut ours);
+    let mut resident = Vec::new();
+    while resident.len() < 50 {
+        reports.next(Duration::from_secs(30)).expect("reports");
+        resident.push(resident_kib(&program));
+    }
+    // Pages of code that are used for the first time count too: a little is allowed.
+    let (early, late) = (resident[9], resident[49]);
+    assert!(late <= early + 256, "{resident:?}");
+    eprintln!("resident after 10 and after 50 reports: {early} and {late} KiB");
+}
+
+fn output(arguments: &[&str]) -> Output {
+    command().args(arguments).output().unwrap()
+}
+
+#[test]
+fn doctor_finds_nothing_wrong_with_the_simulation() {
+    let done = output(&["doctor", "--simulate", "--output", "-"]);
+    let said = String::from_utf8(done.stdout).unwrap();
+    assert_eq!(done.status.code(), Some(0), "{said}");
+    for part in [
+        "output",
+        "camera",
+        "line time",
+        "frames",
+        "light",
+        "texture",
+    ] {
+        assert!(said.contains(&format!("ok    {part}")), "{said}");
+    }
+}
+
+#[test]
+fn a_wrong_configuration_is_named_by_file_line_and_key() {
+    let path = file("wrong", "[measure]\n\nhop_s = 7.5\n");
+    let path = path.to_str().unwrap();
+    let done = output(&["--simulate", "--config", path]);
+    assert_eq!(done.status.code(), Some(2));
+    let said = String::from_utf8(done.stderr).unwrap();
+    let wanted = format!("rowtone-rpi: {path}:3: measure.hop_s is 7.5: give 0.01 to 1\n");
+    assert_eq!(said, wanted);
+    let done = output(&["--simulate", "--config", "/nonexistent.toml"]);
+    assert_eq!(done.status.code(), Some(2));
+    let said = String::from_utf8(done.stderr).unwrap();
+    assert!(
+        said.starts_with("rowtone-rpi: /nonexistent.toml: cannot be read"),
+        "{said}"
+    );
+}
