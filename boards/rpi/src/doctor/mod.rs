@@ -1,5 +1,7 @@
 //! Looks at every part and says what to do about each.
 
+mod permissions;
+
 use std::fmt::Write as _;
 use std::fs::OpenOptions;
 use std::time::{Duration, Instant};
@@ -44,6 +46,9 @@ impl Findings {
 pub fn examine(config: &Config, camera: Result<Box<dyn Source>, CameraError>) -> Findings {
     let mut findings = Findings::default();
     port(config, &mut findings);
+    permissions::console(config, &mut findings);
+    permissions::camera(&mut findings);
+    permissions::priority(config, &mut findings);
     match camera {
         Ok(mut source) => watch(source.as_mut(), config, &mut findings),
         Err(e) => findings.bad(&format!("camera: {e}")),
@@ -201,7 +206,8 @@ mod tests {
             ..Scene::default()
         };
         let camera: Box<dyn Source> = Box::new(Simulated::new(scene));
-        let config = "[output]\nport = \"-\"\n[camera]\nlearn_frames = 10";
+        let config =
+            "[output]\nport = \"-\"\n[camera]\nlearn_frames = 10\n[service]\nrealtime_priority = 0";
         let found = findings(config, Ok(camera));
         assert!(!found.bad, "{}", found.text);
         assert_eq!(
