@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # cargo for 64-bit Arm Linux (Raspberry Pi OS) on a machine of another kind.
 #
-#   tools/aarch64-cargo.sh build --release -p rowtone-rpi --no-default-features
+#   tools/aarch64-cargo.sh build --release -p rowtone-rpi      # without libcamera; with it: boards/rpi/deb.sh
 #
 # With rustup's target (`rustup target add aarch64-unknown-linux-gnu`) plain cargo is run; without it Debian's
 # rustc-web, cargo-web and rust-web-src build the standard library from source. The linker is Debian's

@@ -1,18 +1,34 @@
 #!/usr/bin/env bash
 # rowtone-rpi's own tests, on a Debian machine without a camera:
 #
-#   boards/rpi/ci.sh [all|host|libcamera|aarch64]
+#   boards/rpi/ci.sh [all|host|libcamera|aarch64|deb]
 #
-# host: the package without libcamera (simulated camera). libcamera: builds libcamera 0.7 with its virtual
-# pipeline (once, kept in target/libcamera or $ROWTONE_LIBCAMERA), then the package with it and the program
+# host: the package without libcamera (simulated camera), and its unit. libcamera: builds libcamera 0.7 with its
+# virtual pipeline (once, kept in target/libcamera or $ROWTONE_LIBCAMERA), then the package with it and the program
 # against it, its UART on a pseudo-terminal. aarch64: the core's tests and the bit-identity of its kernels under
-# emulation, and the program cross-built. libcamera and aarch64 install Debian packages where they are missing.
+# emulation. deb: the Debian package for arm64, and the program in it under emulation: peaks at the other end of its
+# pseudo-terminal. Installs Debian packages where they are missing.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
+
+need() { # PACKAGE...
+    if ! dpkg-query -W "$@" >/dev/null 2>&1; then
+        apt-get update -qq
+        apt-get install -y -qq --no-install-recommends "$@" >/dev/null
+    fi
+}
 
 host() {
     cargo clippy --locked -p rowtone-rpi --all-targets -- -D warnings
     cargo test --locked -p rowtone-rpi
+    if command -v systemd-analyze >/dev/null; then
+        folder=$(mktemp -d)
+        # The program need not be installed for that.
+        sed 's|/usr/bin/rowtone-rpi|/bin/true|' boards/rpi/debian/rowtone-rpi.service >"$folder/rowtone-rpi.service"
+        systemd-analyze verify --man=no "$folder/rowtone-rpi.service"
+        systemd-analyze security --offline=yes --threshold=15 "$folder/rowtone-rpi.service" | tail -1
+        rm -r "$folder"
+    fi
 }
 
 libcamera() {
@@ -21,24 +37,41 @@ libcamera() {
     export LIBCAMERA_LOG_LEVELS='*:WARN'
     cargo clippy --locked -p rowtone-rpi --features libcamera --all-targets -- -D warnings
     cargo test --locked --release -p rowtone-rpi --features libcamera --test libcamera -- --nocapture
+    unset PKG_CONFIG_PATH LD_LIBRARY_PATH
 }
 
 aarch64() {
-    packages=(gcc-aarch64-linux-gnu libc6-dev-arm64-cross qemu-user-static)
-    if ! dpkg -s "${packages[@]}" >/dev/null 2>&1; then
-        apt-get update -qq
-        apt-get install -y -qq --no-install-recommends "${packages[@]}" >/dev/null
-    fi
+    need gcc-aarch64-linux-gnu libc6-dev-arm64-cross qemu-user-static
     tools/test-aarch64.sh
-    tools/aarch64-cargo.sh build --locked --release -p rowtone-rpi
+}
+
+deb() {
+    need gcc-aarch64-linux-gnu g++-aarch64-linux-gnu libc6-dev-arm64-cross qemu-user-static libclang-dev pkg-config
+    package=$(boards/rpi/deb.sh)
+    dpkg-deb --info "$package"
+    dpkg-deb --contents "$package"
+    # Installed into a folder: no script can run there, so they are told to keep out of it.
+    folder=$(mktemp -d)
+    mkdir -p "$folder/var/lib/dpkg/info" "$folder/var/lib/dpkg/updates"
+    touch "$folder/var/lib/dpkg/status"
+    dpkg --root="$folder" --force-script-chrootless --force-architecture --force-depends --force-not-root \
+        --install "$package"
+    sysroot=$(boards/rpi/ci/arm64-sysroot.sh)
+    ROWTONE_PROGRAM="qemu-aarch64-static -L $sysroot $folder/usr/bin/rowtone-rpi" \
+        cargo test --locked -p rowtone-rpi --test program -- --test-threads 1
+    dpkg --root="$folder" --force-script-chrootless --force-architecture --force-not-root --purge rowtone-rpi
+    left=$(find "$folder" -path "$folder/var" -prune -o -type f -print)
+    rm -r "$folder"
+    [ -z "$left" ] || { echo "left behind by the package: $left" >&2 && exit 1; }
 }
 
 case ${1:-all} in
-    host | libcamera | aarch64) "$1" ;;
+    host | libcamera | aarch64 | deb) "$1" ;;
     all)
         host
         libcamera
         aarch64
+        deb
         ;;
-    *) echo "usage: boards/rpi/ci.sh [all|host|libcamera|aarch64]" >&2 && exit 2 ;;
+    *) echo "usage: boards/rpi/ci.sh [all|host|libcamera|aarch64|deb]" >&2 && exit 2 ;;
 esac

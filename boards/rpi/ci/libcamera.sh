@@ -28,27 +28,9 @@ if ! dpkg-query -W "${packages[@]}" >/dev/null 2>&1; then
     apt-get install -y -qq --no-install-recommends "${packages[@]}"
 fi
 
-# The machine's own archives, with another suite and type; both of apt's formats. Suites with a dash
-# (updates, security) have no source package of ours.
 mkdir -p "$work/lists/partial" "$work/source"
-shopt -s nullglob
-{
-    for list in /etc/apt/sources.list.d/*.sources; do
-        awk -v RS= '{
-            uri = ""; plain = 0
-            lines = split($0, line, "\n")
-            for (i = 1; i <= lines; i++) {
-                words = split(line[i], word, " ")
-                if (word[1] == "URIs:") uri = word[2]
-                if (word[1] == "Suites:") for (k = 2; k <= words; k++) if (word[k] !~ /[-\/]/) plain = 1
-            }
-            if (plain) print uri
-        }' "$list"
-    done
-    for list in /etc/apt/sources.list /etc/apt/sources.list.d/*.list; do
-        [ ! -e "$list" ] || awk '$1 == "deb" { sub(/\[[^]]*\]/, ""); if ($3 !~ /[-\/]/) print $2 }' "$list"
-    done
-} | sort -u | sed "s|.*|deb-src & $suite main|" >"$work/sources.list"
+. "$root/boards/rpi/ci/archives.sh"
+archives deb-src "$suite" >"$work/sources.list"
 apt_options=(-o "Dir::Etc::sourcelist=$work/sources.list" -o Dir::Etc::sourceparts=/dev/null
     -o "Dir::State::lists=$work/lists" -o APT::Sandbox::User=root)
 apt-get "${apt_options[@]}" update -qq || true # a source that has not got the suite may fail
