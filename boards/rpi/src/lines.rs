@@ -5,6 +5,7 @@
 use rowtone::analyzer::Collector;
 use rowtone::camera::{Line, Pixels};
 use rowtone::kernel::Kernel;
+use rowtone::raw::UPPER_SPARE;
 use rowtone::report::{Warning, Warnings};
 use rowtone::spectrum::{self, SampleBuffer};
 use rowtone::timeline::Binner;
@@ -120,7 +121,7 @@ impl<'a> Lines<'a> {
                 saturated: 0.0,
             },
             words: vec![0; setup.part.width.into()],
-            upper: vec![0; setup.part.width.into()],
+            upper: vec![0; usize::from(setup.part.width) + UPPER_SPARE],
             kernel: Kernel::detect(),
             frame_bytes: last_row * shape.stride + line_end,
             told: Counts::default(),
