@@ -209,11 +209,7 @@ fn list(config: &Config) -> ExitCode {
             return ExitCode::FAILURE;
         }
     };
-    let needs = Needs {
-        highest_hz: config.highest_hz().into(),
-        reach: (0, 0),
-    };
-    match choose(&offers, config.camera.mode, &needs) {
+    match choose(&offers, config.camera.mode, &Needs::of(config)) {
         Ok(choice) => {
             print!("{}", choice.reasons);
             ExitCode::SUCCESS

@@ -8,6 +8,8 @@
 use std::fmt;
 use std::str::FromStr;
 
+use crate::config::Config;
+
 /// Lines a period of the highest frequency that are wanted at least.
 const LINES_A_PERIOD: f64 = 2.5;
 
@@ -73,6 +75,19 @@ pub struct Needs {
     pub highest_hz: f64,
     /// Columns and rows that the region reaches to.
     pub reach: (u16, u16),
+}
+
+impl Needs {
+    /// What the configuration asks for.
+    pub fn of(config: &Config) -> Self {
+        let reach = config.settings.roi.map_or((0, 0), |r| {
+            (r.x.saturating_add(r.width), r.y.saturating_add(r.height))
+        });
+        Self {
+            highest_hz: config.highest_hz().into(),
+            reach,
+        }
+    }
 }
 
 /// A choice and its reasons.

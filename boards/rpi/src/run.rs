@@ -224,11 +224,14 @@ fn sessions(
 
 fn describe(source: &dyn Source, setup: &Setup) -> String {
     let facts = source.facts();
-    let mut text = format!(
-        "{}: {}x{}, {} bit, part {}x{} at {},{}, {} rows a sample",
+    // Which modes there are, and why this one.
+    let mut text = facts.reasons.clone();
+    text += &format!(
+        "{}: {}x{}, {} of {} bits, part {}x{} at {},{}, {} rows a sample",
         facts.id,
         facts.shape.width,
         facts.shape.height,
+        setup.tracker.bits,
         facts.shape.format.bits(),
         setup.part.width,
         setup.part.height,

@@ -33,6 +33,7 @@ struct Camera {
     two_frame_rates: Maybe<bool>,
     exposure_us: Maybe<u32>,
     gain: Maybe<f64>,
+    focus_dioptres: Maybe<f64>,
     roi: Maybe<[u16; 4]>,
     line_time_us: Maybe<f64>,
     calibration: Option<PathBuf>,
@@ -172,6 +173,8 @@ impl Reader<'_> {
         camera.exposure_us = self.number("camera.exposure_us", &file.exposure_us, 1..=1_000_000)?;
         let gain = self.number("camera.gain", &file.gain, 1.0..=64.0)?;
         camera.gain = gain.map_or(camera.gain, |gain| gain as f32);
+        let focus = self.number("camera.focus_dioptres", &file.focus_dioptres, 0.0..=32.0)?;
+        camera.focus_dioptres = focus.map(|dioptres| dioptres as f32);
         let line = self.number("camera.line_time_us", &file.line_time_us, 0.1..=4000.0)?;
         camera.line_time_s = line.map(|us| us * 1e-6);
         let learn = self.number("camera.learn_frames", &file.learn_frames, 1..=1000)?;

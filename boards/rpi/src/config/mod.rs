@@ -44,6 +44,8 @@ pub struct CameraConfig {
     pub exposure_us: Option<u32>,
     /// Analogue gain.
     pub gain: f32,
+    /// Where a lens with a motor is set to, dioptres (one over the distance in m); left alone where there is none.
+    pub focus_dioptres: Option<f32>,
     /// From one row to the next, s.
     pub line_time_s: Option<f64>,
     /// A calibration file that says so.
@@ -109,6 +111,7 @@ impl Config {
                 two_frame_rates: false,
                 exposure_us: None,
                 gain: 4.0,
+                focus_dioptres: None,
                 line_time_s: None,
                 calibration: None,
                 learn_frames: 30,

@@ -2,11 +2,13 @@
 
 use std::cell::Cell;
 use std::rc::Rc;
-use std::sync::mpsc::channel;
+use std::sync::mpsc::sync_channel;
 
 use libcamera::camera::{ActiveCamera, Camera, CameraConfiguration};
 use libcamera::control::{ControlEntry, ControlList};
-use libcamera::controls::{AeEnable, AnalogueGain, AwbEnable, ExposureTime, FrameDurationLimits};
+use libcamera::controls::{
+    AeEnable, AfMode, AnalogueGain, AwbEnable, ExposureTime, FrameDurationLimits, LensPosition,
+};
 use libcamera::geometry::Size;
 use libcamera::pixel_format::PixelFormat;
 use libcamera::stream::{Stream, StreamRole};
@@ -78,15 +80,8 @@ impl Opened {
     pub(super) fn new(found: &Camera<'static>, config: &Config) -> Result<Self, CameraError> {
         let wish = &config.camera;
         let (role, offers) = offers(found, wish.stream);
-        let reach = config.settings.roi.map_or((0, 0), |r| {
-            (r.x.saturating_add(r.width), r.y.saturating_add(r.height))
-        });
-        let needs = Needs {
-            highest_hz: config.highest_hz().into(),
-            reach,
-        };
-        let choice =
-            choose(&offers, wish.mode, &needs).map_err(|e| CameraError::Refused(e.to_string()))?;
+        let choice = choose(&offers, wish.mode, &Needs::of(config))
+            .map_err(|e| CameraError::Refused(e.to_string()))?;
         let mut camera = found
             .acquire()
             .map_err(refused("it is in use by another program"))?;
@@ -143,10 +138,10 @@ impl Opened {
         works: Rc<Cell<bool>>,
     ) -> Result<Capture, CameraError> {
         let mut requests = buffers::requests(&mut self)?;
-        let (completed, queue) = channel();
-        // Bounded all the same: no more requests than buffers exist.
+        // Room for all of them: libcamera's thread never waits here.
+        let (completed, queue) = sync_channel(requests.len());
         self.camera.on_request_completed(move |request| {
-            let _ = completed.send(request);
+            let _ = completed.try_send(request);
         });
         let controls = controls(&self.camera, config, self.facts.frame_period_ns);
         let mut capture = Capture::new(self.camera, queue, self.stream, self.facts, works, manager);
@@ -221,6 +216,10 @@ fn controls(
     set!(AwbEnable, AwbEnable(false));
     set!(ExposureTime, ExposureTime(config.exposure_us() as i32));
     set!(AnalogueGain, AnalogueGain(config.camera.gain));
+    if let Some(dioptres) = config.camera.focus_dioptres {
+        set!(AfMode, AfMode::Manual);
+        set!(LensPosition, LensPosition(dioptres));
+    }
     if let Some(us) = period_ns.map(|ns| ns / 1000) {
         set!(FrameDurationLimits, FrameDurationLimits([us, us]));
     }
