@@ -2,6 +2,8 @@
 #![allow(unsafe_code)]
 
 use std::io;
+use std::os::fd::AsRawFd;
+use std::time::Duration;
 
 /// Gives the calling thread a real-time priority (SCHED_FIFO), 1 to 99.
 ///
@@ -34,6 +36,23 @@ pub fn lock_memory() -> io::Result<()> {
     } else {
         Err(io::Error::last_os_error())
     }
+}
+
+/// Most bytes that a pipe takes at once where it takes any (POSIX asks for 512, Linux has 4096).
+pub const PIPE_ROOM: usize = 4096;
+
+/// Whether [`PIPE_ROOM`] bytes can be written without waiting for a reader, or will be able to within so long.
+pub fn is_writable(file: &impl AsRawFd, within: Duration) -> bool {
+    let mut poll = libc::pollfd {
+        fd: file.as_raw_fd(),
+        events: libc::POLLOUT,
+        revents: 0,
+    };
+    let ms = i32::try_from(within.as_millis()).unwrap_or(i32::MAX);
+    // SAFETY: one pollfd, which lives until the end of the call.
+    let ready = unsafe { libc::poll(&mut poll, 1, ms) };
+    // An error shows at the write itself.
+    ready > 0
 }
 
 /// Anonymous memory with a file descriptor.

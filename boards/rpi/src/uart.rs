@@ -15,6 +15,7 @@ use serialport::SerialPort;
 use crate::backoff::Backoff;
 use crate::config::OutputConfig;
 use crate::session::Shared;
+use crate::system;
 
 /// How long a loop waits for a report before it looks at the line again.
 const STEP: Duration = Duration::from_millis(5);
@@ -54,10 +55,14 @@ impl Port {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         let written = match self {
             Self::Serial(port) => port.write(bytes),
-            Self::Stdout(out) => out
-                .write_all(bytes)
-                .and_then(|()| out.flush())
-                .map(|()| bytes.len()),
+            // Nobody may read the pipe just now: that must not keep the program from ending.
+            Self::Stdout(out) if !system::is_writable(out, STEP) => Ok(0),
+            Self::Stdout(out) => {
+                let bytes = bytes.get(..system::PIPE_ROOM).unwrap_or(bytes);
+                out.write_all(bytes)
+                    .and_then(|()| out.flush())
+                    .map(|()| bytes.len())
+            }
         };
         match written {
             Err(e)

@@ -160,6 +160,43 @@ fn memory_does_not_grow_once_reports_flow() {
     eprintln!("resident after 10 and after 50 reports: {early} and {late} KiB");
 }
 
+/// A pipe that nobody reads is no reason not to end.
+#[test]
+fn sigterm_ends_it_though_nobody_reads() {
+    use std::os::fd::AsRawFd;
+    let config = file(
+        "stalled",
+        "[camera]\nlearn_frames = 8\n[measure]\nwindow_s = 0.2\nhop_s = 0.02\n",
+    );
+    let child = command()
+        .args(["--simulate", "--output", "-", "--config"])
+        .arg(&config)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null())
+        .spawn();
+    let mut program = Program(child.unwrap());
+    let mut pipe = program.0.stdout.take().unwrap();
+    // SAFETY: the descriptor is open, and the call takes a number.
+    let set = unsafe { libc::fcntl(pipe.as_raw_fd(), libc::F_SETPIPE_SZ, 8192) };
+    assert!(set >= 0);
+    // Until the pipe is full.
+    let began = Instant::now();
+    let mut waiting: libc::c_int = 0;
+    while waiting < 3500 {
+        std::thread::sleep(Duration::from_millis(50));
+        // SAFETY: the call writes one int, which lives until its end.
+        let asked = unsafe { libc::ioctl(pipe.as_raw_fd(), libc::FIONREAD, &mut waiting) };
+        assert!(asked == 0 && began.elapsed() < Duration::from_secs(60));
+    }
+    let asked = Instant::now();
+    terminate(&program);
+    assert_eq!(program.0.wait().unwrap().code(), Some(0));
+    assert!(asked.elapsed() < Duration::from_secs(5));
+    let mut said = String::new();
+    pipe.read_to_string(&mut said).unwrap();
+    assert!(said.contains("$RTRPT"), "{said}");
+}
+
 fn output(arguments: &[&str]) -> Output {
     command().args(arguments).output().unwrap()
 }
