@@ -6,8 +6,9 @@
 # host: the package without libcamera (simulated camera), and its unit. libcamera: builds libcamera 0.7 with its
 # virtual pipeline (once, kept in target/libcamera or $ROWTONE_LIBCAMERA), then the package with it and the program
 # against it, its UART on a pseudo-terminal. aarch64: the core's tests and the bit-identity of its kernels under
-# emulation. deb: the Debian package for arm64, and the program in it under emulation: peaks at the other end of its
-# pseudo-terminal. Installs Debian packages where they are missing.
+# emulation. deb: the Debian package for arm64, installed into a folder, and the program in it under emulation: on its
+# simulated camera and on Debian's arm64 libcamera, peaks at the other end of its pseudo-terminal. Installs Debian
+# packages where they are missing.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 
@@ -33,11 +34,13 @@ host() {
 
 libcamera() {
     prefix=$(boards/rpi/ci/libcamera.sh)
-    export PKG_CONFIG_PATH=$prefix/lib/pkgconfig LD_LIBRARY_PATH=$prefix/lib ROWTONE_LIBCAMERA=$prefix
-    export LIBCAMERA_LOG_LEVELS='*:WARN'
-    cargo clippy --locked -p rowtone-rpi --features libcamera --all-targets -- -D warnings
-    cargo test --locked --release -p rowtone-rpi --features libcamera --test libcamera -- --nocapture
-    unset PKG_CONFIG_PATH LD_LIBRARY_PATH
+    with_libcamera cargo clippy --locked -p rowtone-rpi --features libcamera --all-targets -- -D warnings
+    ROWTONE_LIBCAMERA=$prefix with_libcamera cargo test --locked --release -p rowtone-rpi --features libcamera \
+        --test libcamera -- --nocapture
+}
+
+with_libcamera() { # COMMAND...: with the libcamera that was built for this machine
+    PKG_CONFIG_PATH=$prefix/lib/pkgconfig LD_LIBRARY_PATH=$prefix/lib LIBCAMERA_LOG_LEVELS='*:FATAL' "$@"
 }
 
 aarch64() {
@@ -57,8 +60,13 @@ deb() {
     dpkg --root="$folder" --force-script-chrootless --force-architecture --force-depends --force-not-root \
         --install "$package"
     sysroot=$(boards/rpi/ci/arm64-sysroot.sh)
-    ROWTONE_PROGRAM="qemu-aarch64-static -L $sysroot $folder/usr/bin/rowtone-rpi" \
-        cargo test --locked -p rowtone-rpi --test program -- --test-threads 1
+    export ROWTONE_PROGRAM="qemu-aarch64-static -L $sysroot $folder/usr/bin/rowtone-rpi"
+    cargo test --locked -p rowtone-rpi --test program -- --test-threads 1
+    # And with its own libcamera's virtual camera; the test itself is this machine's and links to the one built here.
+    prefix=$(boards/rpi/ci/libcamera.sh)
+    ROWTONE_LIBCAMERA=$sysroot/usr with_libcamera cargo test --locked --release -p rowtone-rpi --features libcamera \
+        --test libcamera -- --nocapture
+    unset ROWTONE_PROGRAM
     dpkg --root="$folder" --force-script-chrootless --force-architecture --force-not-root --purge rowtone-rpi
     left=$(find "$folder" -path "$folder/var" -prune -o -type f -print)
     rm -r "$folder"

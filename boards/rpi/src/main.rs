@@ -10,6 +10,7 @@ use rowtone_rpi::capture::simulated::{Scene, Simulated};
 use rowtone_rpi::capture::{CameraError, Source};
 use rowtone_rpi::config::{Config, ConfigError, Replay, StreamWish};
 use rowtone_rpi::doctor;
+use rowtone_rpi::mode::Wish;
 use rowtone_rpi::run::{self, log};
 use rowtone_rpi::session::Shared;
 
@@ -48,7 +49,7 @@ struct Cli {
     /// For tests: pictures are so far apart, whatever the camera's clock says
     #[arg(long, value_name = "T", global = true)]
     frame_period_us: Option<f64>,
-    /// A simulated machine instead of a camera (97.3 Hz with 0.4 px, 211.7 Hz with 0.1 px)
+    /// A simulated machine instead of a camera (97.3 Hz with 0.4 px, 211.7 Hz with 0.1 px); --mode gives its size
     #[arg(long, global = true)]
     simulate: bool,
     #[command(subcommand)]
@@ -171,8 +172,15 @@ type Opener = Box<dyn FnMut(&Config) -> Result<Box<dyn Source>, CameraError>>;
 
 fn opener(simulate: bool) -> Result<Opener, CameraError> {
     if simulate {
-        return Ok(Box::new(|_| {
-            Ok(Box::new(Simulated::new(Scene::default())) as Box<dyn Source>)
+        return Ok(Box::new(|config: &Config| {
+            let mut scene = Scene::default();
+            if let Wish::Size { width, height } = config.camera.mode {
+                (scene.width, scene.height) = (width, height);
+            }
+            // No faster than its rows can be read.
+            let readout_ns = f64::from(scene.height) * scene.line_time_s * 1e9;
+            scene.frame_period_ns = scene.frame_period_ns.max(readout_ns.ceil() as i64);
+            Ok(Box::new(Simulated::new(scene)) as Box<dyn Source>)
         }));
     }
     camera()

@@ -47,7 +47,7 @@ fn start(name: &str, measure: &str) -> (Program, TTYPort, TTYPort) {
     let config = file(
         name,
         &format!(
-            "[camera]\nlearn_frames = 8\nexposure_us = 1\n[measure]\n{measure}\n\
+            "[camera]\nmode = \"160x120\"\nlearn_frames = 8\nexposure_us = 1\n[measure]\n{measure}\n\
              [service]\nrealtime_priority = 0\nstate = \"/nonexistent/state\"\n"
         ),
     );
@@ -166,7 +166,7 @@ fn sigterm_ends_it_though_nobody_reads() {
     use std::os::fd::AsRawFd;
     let config = file(
         "stalled",
-        "[camera]\nlearn_frames = 8\n[measure]\nwindow_s = 0.2\nhop_s = 0.02\n",
+        "[camera]\nmode = \"160x120\"\nlearn_frames = 8\n[measure]\nwindow_s = 0.2\nhop_s = 0.02\n",
     );
     let child = command()
         .args(["--simulate", "--output", "-", "--config"])
@@ -203,7 +203,7 @@ fn output(arguments: &[&str]) -> Output {
 
 #[test]
 fn doctor_finds_nothing_wrong_with_the_simulation() {
-    let done = output(&["doctor", "--simulate", "--output", "-"]);
+    let done = output(&["doctor", "--simulate", "--mode", "160x120", "--output", "-"]);
     let said = String::from_utf8(done.stdout).unwrap();
     assert_eq!(done.status.code(), Some(0), "{said}");
     for part in [
