@@ -30,6 +30,10 @@ pub(crate) fn average_in<P: Pixel>(
     let stride = recipe.stride;
     let steps = shift_px / stride as f32;
     let whole = libm::floorf(steps);
+    // As far as that, and where nothing is known, no pixel of the line is of use.
+    if whole.is_nan() || whole.abs() > pixels.len() as f32 {
+        return;
+    }
     let weights = lagrange(steps - whole);
     let offset = whole as isize * stride as isize;
     // Where all six taps are inside the line.
@@ -65,17 +69,20 @@ pub(crate) fn move_row_by(row: &mut [u16], shift_px: f32, stride: usize, scratch
     for (old, &r) in old.iter_mut().zip(row.iter()) {
         *old = f32::from(r);
     }
-    let steps = shift_px / stride as f32;
+    // Further than that it is all edge.
+    let most = old.len() as f32;
+    let steps = shift_px.clamp(-most, most) / stride as f32;
+    if steps.is_nan() {
+        return;
+    }
     let whole = libm::ceilf(steps);
     let weights = lagrange(whole - steps);
-    // The edge's colours repeat: the cast saturates, and so does what is added to it.
-    let offset = (whole as isize).saturating_mul(stride as isize);
+    let offset = whole as isize * stride as isize;
     let last = old.len().saturating_sub(stride);
     for (x, r) in row.iter_mut().enumerate() {
         let mut value = 0.0;
         for (tap, weight) in (-2isize..).zip(weights) {
-            let at = (x as isize).saturating_add(tap * stride as isize);
-            let at = at.saturating_sub(offset);
+            let at = x as isize + tap * stride as isize - offset;
             let colour = x % stride;
             let at = if at < 0 {
                 colour
@@ -106,7 +113,7 @@ pub(crate) fn lagrange(t: f32) -> [f32; 6] {
 
 #[cfg(test)]
 mod tests {
-    use super::{lagrange, move_row_by};
+    use super::{Recipe, average_in, lagrange, move_row_by};
 
     #[test]
     fn polynomials_of_fifth_degree_are_exact() {
@@ -117,6 +124,28 @@ mod tests {
                 .map(|(x, w)| w * p(f32::from(x)))
                 .sum();
             assert!((value - p(t)).abs() < 1e-5, "{t}");
+        }
+    }
+
+    #[test]
+    fn a_line_that_is_nowhere_near_leaves_the_mean_alone() {
+        let recipe = |stride| Recipe {
+            level: crate::band::Level::Fine,
+            stride,
+            margin_px: 0,
+            noise: crate::noise::PixelNoise::guess(256.0),
+            counts_per_value: 128.0,
+            saturation: 254.0,
+            kernel: crate::kernel::Kernel::PORTABLE,
+        };
+        for stride in [1, 2] {
+            for shift in [33.0, 1e6, 1e19, f32::MAX, f32::INFINITY, f32::NAN] {
+                for shift in [shift, -shift] {
+                    let mut mean = [777; 32];
+                    average_in(&mut mean, &[200u8; 32], shift, 0.5, 0.5, &recipe(stride));
+                    assert_eq!(mean, [777; 32], "{shift}");
+                }
+            }
         }
     }
 

@@ -126,7 +126,10 @@ pub struct Line<'a> {
     pub frame: u32,
     /// Row in the picture (or in the part of it that is used), from 0.
     pub row: u16,
-    /// Start of this line's exposure, ns on the camera's clock.
+    /// Start of this line's exposure, ns on the camera's clock. Where the exposure changes from frame to
+    /// frame and the camera tells it: its middle less half of [`Timing::exposure_ns`], because what is
+    /// measured is where the picture was then. (A step of 30 % that nobody told makes side tones of 0.35 %
+    /// beside 37 Hz at 0.2 ms; brightness alone cannot tell exposure from gain.)
     pub start_ns: i64,
     /// Its pixels.
     pub pixels: Pixels<'a>,

@@ -10,7 +10,10 @@
 //! ([`RowTable::shift_of_smeared_px`]). Left out, 4 px at 1 kHz with 0.2 ms of exposure get a third harmonic
 //! of 1 %.
 
-use super::{Stage, Tracker, nearest, overlap::Overlap};
+use super::{
+    Stage, Tracker,
+    overlap::{Overlap, nearest_step},
+};
 use crate::{camera::Timing, pixel::Pixel, reference::RowTable};
 
 /// Smears change a shift by less than this, px.
@@ -144,7 +147,7 @@ impl Tracker<'_> {
     ) -> Option<f32> {
         let width = pixels.len();
         let stride = i32::from(self.config.stride);
-        let whole = nearest(shift_px / stride as f32) * stride;
+        let whole = nearest_step(shift_px, stride);
         let overlap = Overlap::new(width, whole)?;
         let coefficients = self.storage.coefficients.get(row * width..)?.get(..width)?;
         let sums = P::sums(

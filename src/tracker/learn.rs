@@ -179,7 +179,13 @@ impl Tracker<'_> {
         align::average_in(mean, pixels, shift_px, keep * bright, keep, &self.recipe);
     }
 
-    fn measure_noise<P: Pixel>(&mut self, row: usize, pixels: &[P], shift_px: f32, frames: u16) {
+    pub(super) fn measure_noise<P: Pixel>(
+        &mut self,
+        row: usize,
+        pixels: &[P],
+        shift_px: f32,
+        frames: u16,
+    ) {
         let width = pixels.len();
         let Some(mean) = self.storage.mean.get(row * width..(row + 1) * width) else {
             return;

@@ -18,6 +18,8 @@ mod gap;
 mod learn;
 mod overlap;
 mod predict;
+#[cfg(test)]
+mod tests;
 mod watch;
 
 pub use config::{Config, ConfigError, Storage};
@@ -35,7 +37,7 @@ use crate::{
 use blur::Blur;
 use flicker::Flicker;
 use follow::Follow;
-use overlap::Overlap;
+use overlap::{Overlap, nearest_step};
 use predict::Prediction;
 use watch::Watch;
 
@@ -307,7 +309,7 @@ impl<'a> Tracker<'a> {
         let mean = self.storage.mean.get(row * width..)?.get(..width)?;
         let stride = i32::from(self.config.stride);
         let limit = width as i32 / 2;
-        let steps = |px: f32| nearest(px / stride as f32) * stride;
+        let steps = |px: f32| nearest_step(px, stride);
         let mut whole = steps(expected_px).clamp(-limit, limit);
         let mut shift_px = f32::NAN;
         for _ in 0..6 {

@@ -6,7 +6,10 @@
 //! searched for over the whole range of motion; if it is not found either, it is disturbed, and so are
 //! the following ones until one fits again.
 
-use super::{Stage, Tracker, overlap::Overlap};
+use super::{
+    Stage, Tracker,
+    overlap::{Overlap, nearest_step},
+};
 use crate::{pixel::Pixel, reference::RowTable};
 
 /// In tracking one row in this many is looked at even if it does not surprise.
@@ -75,7 +78,7 @@ impl Watch {
 }
 
 /// What a line leaves over, per pixel and in units of the pixels' variance.
-struct Rest {
+pub(super) struct Rest {
     /// Mean square of what is left.
     power: f32,
     /// Mean square that an error of the shift of 1 px would leave.
@@ -134,13 +137,13 @@ impl Tracker<'_> {
     }
 
     /// What is left of a line when its reference, shifted, is taken off; some columns serve.
-    fn rest<P: Pixel>(&self, row: usize, pixels: &[P], shift_px: f32) -> Option<Rest> {
+    pub(super) fn rest<P: Pixel>(&self, row: usize, pixels: &[P], shift_px: f32) -> Option<Rest> {
         let width = pixels.len();
         let r = &self.recipe;
         let mean = self.storage.mean.get(row * width..)?.get(..width)?;
         let frames = f32::from(self.storage.learning.get(row)?.frames.max(1));
         let stride = r.stride as i32;
-        let whole = super::nearest(shift_px / stride as f32) * stride;
+        let whole = nearest_step(shift_px, stride);
         let near = shift_px - whole as f32;
         let overlap = Overlap::new(width, whole)?;
         let (mean, mask) = (

@@ -17,6 +17,8 @@ pub struct Case {
     pub measured_from_s: f64,
     /// Peaks are looked for too.
     pub peaks: bool,
+    /// The camera tells how long each frame was exposed, and the lines' times are given accordingly.
+    pub exposure_told: bool,
 }
 
 /// The scenes of the figures.
@@ -71,6 +73,7 @@ pub fn small_motion(seed: u64, rows: u32, frames: u32) -> Vec<Case> {
                 max_hz: 1000.0,
                 measured_from_s: 0.0,
                 peaks: false,
+                exposure_told: false,
             });
         }
     }
@@ -96,6 +99,7 @@ fn usual(seed: u64, name: &str, tones: Vec<Tone>, seconds: f64) -> Case {
         max_hz: 2500.0,
         measured_from_s: 0.0,
         peaks: true,
+        exposure_told: false,
     }
 }
 
@@ -146,10 +150,16 @@ pub fn hard(seed: u64) -> Vec<Case> {
         c.config.optics.bright = 0.7;
         c.config.disturbances.gain_steps = steps([0.7, 1.3, 1.0]);
     });
-    with("exposure x 0.7, 1.3, 1", 1.0, &|c| {
-        c.config.optics.bright = 0.7;
-        c.config.disturbances.exposure_steps = steps([0.7, 1.3, 1.0]);
-    });
+    for (name, told) in [
+        ("exposure x 0.7, 1.3, 1, not told", false),
+        ("exposure x 0.7, 1.3, 1, told", true),
+    ] {
+        with(name, 1.0, &|c| {
+            c.config.optics.bright = 0.7;
+            c.config.disturbances.exposure_steps = steps([0.7, 1.3, 1.0]);
+            c.exposure_told = told;
+        });
+    }
     with("creep of 0.5 px/s, 6 s", 6.0, &|c| {
         c.config.motion.drift_px_per_s = 0.5;
     });

@@ -120,9 +120,17 @@ pub fn measure(case: &Case) -> Result<Figures, CaseError> {
     let before = u32::from(case.learn_frames) * 2;
     for slot in camera.arriving() {
         let frame = camera.frame(slot);
-        let mut shifts = track(&mut tracker, &frame, split..cols);
+        let later_ns = match case.exposure_told {
+            true => {
+                let truth = camera.row_truth(slot, 0);
+                let usual_ns = i64::from(case.config.sensor.exposure_ns) / 2;
+                truth.middle_ns - usual_ns - slot.start_ns
+            }
+            false => 0,
+        };
+        let mut shifts = track(&mut tracker, &frame, split..cols, later_ns);
         if let Some(still) = &mut still {
-            let background = track(still, &frame, 0..split);
+            let background = track(still, &frame, 0..split, later_ns);
             subtract(&mut shifts, &background);
         }
         if slot.number >= before {
@@ -151,10 +159,12 @@ pub fn measure(case: &Case) -> Result<Figures, CaseError> {
     Ok(figures)
 }
 
+/// `later_ns`: how much later the middle of each exposure is than the tracker's timing says.
 fn track(
     tracker: &mut Tracker<'_>,
     frame: &Frame,
     cols: std::ops::Range<usize>,
+    later_ns: i64,
 ) -> Vec<Displacement> {
     let lines = (0..frame.rows()).filter_map(|row| frame.line(row));
     let shifts = lines.filter_map(|line| {
@@ -162,7 +172,11 @@ fn track(
             Pixels::U8(p) => Pixels::U8(p.get(cols.clone())?),
             Pixels::U16(p) => Pixels::U16(p.get(cols.clone())?),
         };
-        match tracker.push(&Line { pixels, ..line }) {
+        match tracker.push(&Line {
+            pixels,
+            start_ns: line.start_ns + later_ns,
+            ..line
+        }) {
             Outcome::Measured(displacement) => Some(displacement),
             _ => None,
         }

@@ -1,0 +1,318 @@
+//! A tracker in front of a simple picture: each of its parts must do what it is for. What depends on
+//! noise, blur and real sensors is measured by `rowtone sweep lines` and the end-to-end tests.
+
+use super::*;
+use crate::band::MAX_HALF;
+extern crate std;
+use std::{vec, vec::Vec};
+
+const WIDTH: usize = 128;
+const ROWS: usize = 24;
+const LEARN_FRAMES: u16 = 8;
+const FRAME_NS: i64 = 20_000_000;
+
+fn timing() -> Timing {
+    Timing::new(50_000_000, 400_000, ROWS as u16).unwrap()
+}
+
+/// Memory, lent to a tracker once.
+struct Memory {
+    coefficients: Vec<i8>,
+    tables: Vec<RowTable>,
+    mean: Vec<u16>,
+    learning: Vec<RowLearning>,
+    mask: Vec<u8>,
+    columns: Vec<ColumnLearning>,
+    scratch: Vec<f32>,
+}
+
+impl Memory {
+    fn new() -> Self {
+        Self {
+            coefficients: vec![0; WIDTH * ROWS],
+            tables: vec![RowTable::default(); ROWS],
+            mean: vec![0; WIDTH * ROWS],
+            learning: vec![RowLearning::default(); ROWS],
+            mask: vec![u8::MAX; WIDTH],
+            columns: vec![ColumnLearning::default(); WIDTH],
+            scratch: vec![0.0; 2 * WIDTH],
+        }
+    }
+
+    fn tracker(&mut self, stride: u8) -> Tracker<'_> {
+        let config = Config {
+            stride,
+            learn_frames: LEARN_FRAMES,
+            ..Config::new(timing(), WIDTH as u16)
+        };
+        let storage = Storage {
+            coefficients: &mut self.coefficients,
+            tables: &mut self.tables,
+            mean: &mut self.mean,
+            learning: &mut self.learning,
+            mask: &mut self.mask,
+            columns: &mut self.columns,
+            scratch: &mut self.scratch,
+        };
+        Tracker::new(config, storage).unwrap()
+    }
+}
+
+/// A surface without a period that fits the picture; another one for every `scene`.
+fn surface(scene: u8, row: u16, x: f32) -> f32 {
+    let at = f32::from(row) * 1.3 + f32::from(scene) * 17.0;
+    120.0
+        + 35.0 * libm::sinf(0.61 * x + at)
+        + 25.0 * libm::sinf(0.37 * x - 2.1 * at)
+        + 20.0 * libm::sinf(0.173 * x + 0.7 * at)
+}
+
+fn stripes(_: u8, _: u16, x: f32) -> f32 {
+    120.0 + 60.0 * libm::sinf(core::f32::consts::TAU / 16.0 * x)
+}
+
+/// A camera that adds ±1 of noise, and what it looks at.
+struct Camera {
+    frame: u32,
+    dice: u32,
+    scene: u8,
+    surface: fn(u8, u16, f32) -> f32,
+}
+
+impl Camera {
+    fn new(surface: fn(u8, u16, f32) -> f32) -> Self {
+        Self {
+            frame: 0,
+            dice: 1,
+            scene: 0,
+            surface,
+        }
+    }
+
+    /// Shows the tracker the next frame. `shift`: of the surface at a time in s, px; `change`: what else
+    /// happens to a row.
+    fn show(
+        &mut self,
+        tracker: &mut Tracker<'_>,
+        shift: impl Fn(f32) -> f32,
+        change: impl Fn(u16, &mut [u8; WIDTH]),
+    ) -> Vec<Outcome> {
+        let frame = self.frame;
+        self.frame += 1;
+        let outcomes = (0..ROWS as u16).map(|row| {
+            let start_ns = i64::from(frame) * FRAME_NS + timing().start_ns(row);
+            let at = shift((start_ns + 200_000) as f32 * 1e-9);
+            let mut pixels = core::array::from_fn(|x| {
+                self.dice = self
+                    .dice
+                    .wrapping_mul(1_664_525)
+                    .wrapping_add(1_013_904_223);
+                let noise = (self.dice >> 16) as f32 / 32768.0 - 1.0;
+                libm::roundf((self.surface)(self.scene, row, x as f32 - at) + noise) as u8
+            });
+            change(row, &mut pixels);
+            tracker.push(&Line {
+                frame,
+                row,
+                start_ns,
+                pixels: Pixels::U8(&pixels),
+            })
+        });
+        outcomes.collect()
+    }
+
+    /// Both rounds of learning.
+    fn teach(&mut self, tracker: &mut Tracker<'_>, shift: impl Fn(f32) -> f32) {
+        while self.frame < u32::from(LEARN_FRAMES) * 2 {
+            self.show(tracker, &shift, |_, _| ());
+        }
+    }
+}
+
+/// Each row's measured shift less the true one, px; none of the rows may be missing.
+fn errors(outcomes: &[Outcome], shift: impl Fn(f32) -> f32) -> Vec<f32> {
+    let error = |outcome: &Outcome| match outcome {
+        Outcome::Measured(d) => d.shift_px - shift(d.time_ns as f32 * 1e-9),
+        other => panic!("{other:?}"),
+    };
+    outcomes.iter().map(error).collect()
+}
+
+fn still(_: f32) -> f32 {
+    0.0
+}
+
+fn tone(hz: f32, amplitude_px: f32) -> impl Fn(f32) -> f32 {
+    move |t| amplitude_px * libm::sinf(core::f32::consts::TAU * hz * t + 0.4)
+}
+
+/// Largest change of any row's error from frame to frame, over `frames` frames: each row's own offset,
+/// which nobody knows, is the same in all of them.
+fn worst_px(camera: &mut Camera, tracker: &mut Tracker<'_>, shift: impl Fn(f32) -> f32) -> f32 {
+    let first = errors(&camera.show(tracker, &shift, |_, _| ()), &shift);
+    let mut worst = 0.0f32;
+    for _ in 0..30 {
+        let next = errors(&camera.show(tracker, &shift, |_, _| ()), &shift);
+        for (a, b) in first.iter().zip(next) {
+            worst = worst.max((a - b).abs());
+        }
+    }
+    worst
+}
+
+#[test]
+fn learning_puts_the_reference_at_the_middle_of_the_motion() {
+    let (mut memory, mut camera) = (Memory::new(), Camera::new(surface));
+    let mut tracker = memory.tracker(1);
+    // The first frame meets the picture at 3 px.
+    let swing = |t: f32| 3.0 * libm::cosf(core::f32::consts::TAU * 13.7 * t);
+    camera.teach(&mut tracker, swing);
+    let errors = errors(&camera.show(&mut tracker, swing, |_, _| ()), swing);
+    // Of 8 frames the mean of the motion is not quite 0.
+    assert!(errors.iter().all(|e| e.abs() < 1.0), "{errors:?}");
+}
+
+#[test]
+fn swift_motion_is_followed_row_by_row() {
+    for (hz, amplitude_px) in [(7.3, 4.0), (43.7, 4.0), (213.7, 4.0), (11.3, 15.0)] {
+        let (mut memory, mut camera) = (Memory::new(), Camera::new(surface));
+        let mut tracker = memory.tracker(1);
+        let swing = tone(hz, amplitude_px);
+        camera.teach(&mut tracker, &swing);
+        let worst = worst_px(&mut camera, &mut tracker, &swing);
+        assert!(worst < 0.15, "{amplitude_px} px at {hz} Hz: {worst} px");
+    }
+}
+
+#[test]
+fn a_stripe_is_not_taken_for_its_neighbour() {
+    for hz in [7.3, 33.1, 43.7, 119.3] {
+        let (mut memory, mut camera) = (Memory::new(), Camera::new(stripes));
+        let mut tracker = memory.tracker(1);
+        let swing = tone(hz, 4.0);
+        camera.teach(&mut tracker, &swing);
+        let worst = worst_px(&mut camera, &mut tracker, &swing);
+        assert!(worst < 0.15, "{hz} Hz: {worst} px");
+    }
+}
+
+#[test]
+fn a_jump_is_found_in_the_line_in_which_it_happens() {
+    let (mut memory, mut camera) = (Memory::new(), Camera::new(surface));
+    let mut tracker = memory.tracker(1);
+    camera.teach(&mut tracker, still);
+    for to_px in [11.0, -23.0, 0.0] {
+        let at = move |_: f32| to_px;
+        let errors = errors(&camera.show(&mut tracker, at, |_, _| ()), at);
+        // What was learned standing still has no margin: what leaves the picture takes coefficients along.
+        assert!(errors.iter().all(|e| e.abs() < 1.0), "{to_px}: {errors:?}");
+    }
+}
+
+#[test]
+fn a_hand_is_flagged_and_poisons_nothing() {
+    let (mut memory, mut camera) = (Memory::new(), Camera::new(surface));
+    let mut tracker = memory.tracker(1);
+    camera.teach(&mut tracker, still);
+    camera.show(&mut tracker, still, |_, _| ());
+    let before = tracker.storage.mean.to_vec();
+    let hand = |_: u16, pixels: &mut [u8; WIDTH]| pixels[20..80].fill(90);
+    for _ in 0..20 {
+        let outcomes = camera.show(&mut tracker, still, hand);
+        assert!(
+            outcomes.iter().all(|o| *o == Outcome::Disturbed),
+            "{outcomes:?}"
+        );
+    }
+    assert!(tracker.storage.mean == &before[..]);
+    // Gone: the very next line counts again.
+    let after = errors(&camera.show(&mut tracker, still, |_, _| ()), still);
+    assert!(after.iter().all(|e| e.abs() < 0.1), "{after:?}");
+    assert_eq!(tracker.counts().relearned, 0);
+}
+
+#[test]
+fn another_scene_is_learned_anew_and_told() {
+    let (mut memory, mut camera) = (Memory::new(), Camera::new(surface));
+    let mut tracker = memory.tracker(1);
+    camera.teach(&mut tracker, still);
+    camera.scene = 1;
+    let mut frames = 0;
+    while tracker.counts().relearned == 0 {
+        camera.show(&mut tracker, still, |_, _| ());
+        frames += 1;
+        assert!(frames < 100, "not noticed in 2 s");
+    }
+    // 1.5 s, so that a hand is not taken for a scene.
+    assert!(frames > 70, "{frames} frames");
+    camera.frame = 0;
+    camera.teach(&mut tracker, still);
+    let outcomes = camera.show(&mut tracker, still, |_, _| ());
+    let errors = errors(&outcomes, still);
+    assert!(errors.iter().all(|e| e.abs() < 0.1), "{errors:?}");
+    assert_eq!(tracker.counts().relearned, 1);
+}
+
+#[test]
+fn a_creeping_picture_is_followed_beyond_where_its_reference_was() {
+    let (mut memory, mut camera) = (Memory::new(), Camera::new(surface));
+    let mut tracker = memory.tracker(1);
+    let creep = |t: f32| 0.5 * t;
+    camera.teach(&mut tracker, creep);
+    let first = errors(&camera.show(&mut tracker, creep, |_, _| ()), creep);
+    let mut last = Vec::new();
+    for _ in 0..500 {
+        last = errors(&camera.show(&mut tracker, creep, |_, _| ()), creep);
+    }
+    // 5 px on. The reference takes in a little of the picture all the time, half a pixel behind it.
+    assert!(tracker.follow.anchor_px() >= 3.0);
+    for (a, b) in first.iter().zip(&last) {
+        assert!((a - b).abs() < 0.2, "{a} {b}");
+    }
+}
+
+#[test]
+fn dead_columns_are_left_out() {
+    let (mut memory, mut camera) = (Memory::new(), Camera::new(surface));
+    let mut tracker = memory.tracker(1);
+    let swing = tone(13.7, 0.4);
+    let dead = |_: u16, pixels: &mut [u8; WIDTH]| pixels[40] = 255;
+    for _ in 0..2 * LEARN_FRAMES {
+        camera.show(&mut tracker, &swing, dead);
+    }
+    let outcomes = camera.show(&mut tracker, &swing, dead);
+    errors(&outcomes, &swing);
+    let reach = MAX_HALF;
+    let masked: Vec<usize> = (0..WIDTH)
+        .filter(|&x| tracker.storage.mask[x] == 0)
+        .collect();
+    assert_eq!(masked, (40 - reach..=40 + reach).collect::<Vec<_>>());
+    for row in tracker.storage.coefficients.chunks(WIDTH) {
+        assert_eq!(row[40], 0);
+    }
+}
+
+#[test]
+fn a_shift_beyond_all_bounds_overflows_nothing() {
+    for stride in [1, 2] {
+        let (mut memory, mut camera) = (Memory::new(), Camera::new(surface));
+        let mut tracker = memory.tracker(stride);
+        camera.teach(&mut tracker, still);
+        let before = tracker.storage.mean.to_vec();
+        let table = tracker.storage.tables[3];
+        let line = [100u8; WIDTH];
+        for huge in [2e9, 5e9, 1e19, f32::MAX, f32::INFINITY] {
+            for huge in [huge, -huge] {
+                if let Some(shift_px) = tracker.correlate(3, &table, &line, huge) {
+                    assert!(shift_px.abs() <= WIDTH as f32);
+                }
+                assert!(tracker.rest(3, &line, huge).is_none());
+                tracker.follow_row(3, &line, huge);
+                tracker.measure_noise(3, &line, huge, 9);
+            }
+        }
+        assert!(tracker.storage.mean == &before[..]);
+        let errors = errors(&camera.show(&mut tracker, still, |_, _| ()), still);
+        assert!(errors.iter().all(|e| e.abs() < 0.1), "{errors:?}");
+    }
+}
