@@ -186,6 +186,11 @@ impl<'a> Outbox<'a> {
         self.slots.get(index)?.as_ref().filter(|_| self.kept > 0)
     }
 
+    /// Reports that wait to be sent for the first time.
+    pub fn waiting(&self) -> u32 {
+        self.unsent
+    }
+
     /// Number that the next report will get.
     pub fn next_seq(&self) -> u32 {
         self.next

@@ -9,6 +9,7 @@
 //! - [`tracking`]: frames to displacements, on a thread of its own ([`ring`] is between threads);
 //! - [`analysis`]: displacements to reports, in the memory that [`memory`] lends;
 //! - [`output`]: reports, displacements and pictures; [`serial`]: serial ports;
+//!   [`sender`]: a board's end of one;
 //! - [`calibrate`]: what a flashing light tells about a camera; [`linear`]: small linear algebra;
 //! - [`line_scenes`]: recordings with known motion through the tracker, for the line engine's figures;
 //! - [`spectrum_scenes`]: random displacement samples with known tones, for the spectrum's figures;
@@ -33,6 +34,7 @@ pub mod output;
 pub mod receiver;
 pub mod restore;
 pub mod ring;
+pub mod sender;
 pub mod serial;
 pub mod sim;
 pub mod spectrum_scenes;

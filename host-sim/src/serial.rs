@@ -1,17 +1,14 @@
 //! Serial ports: where reports go out and come in.
 //!
-//! A [`PortName`] is what the user writes: a device, and a baud rate if it is not 115200. [`Sender`]
-//! writes beside the measuring, on a thread of its own with a short queue; a port that goes away ends
-//! the sending, never the measuring. [`open_reader`] also takes a file or standard input, so that a
-//! recorded log can be read like a live port.
+//! A [`PortName`] is what the user writes: a device, and a baud rate if it is not 115200.
+//! [`open_reader`] also takes a file or standard input, so that a recorded log can be read like a live
+//! port.
 
 use std::fs::File;
-use std::io::{self, ErrorKind, Read, Write};
+use std::io::{self, ErrorKind, Read};
 use std::path::Path;
 use std::str::FromStr;
-use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
-use std::thread::JoinHandle;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use serialport::SerialPort;
 
@@ -19,10 +16,6 @@ use crate::failure::Failure;
 
 /// What a board uses unless it is told otherwise.
 const USUAL_BAUD: u32 = 115_200;
-/// Sentences waiting to be written.
-const QUEUE: usize = 16;
-/// A port that takes nothing for this long is given up.
-const PATIENCE: Duration = Duration::from_secs(3);
 /// How long one read or write may wait before it is tried again.
 const STEP: Duration = Duration::from_millis(100);
 
@@ -92,127 +85,8 @@ impl PortName {
     }
 }
 
-/// Writes to a serial port beside other work.
-#[derive(Debug)]
-pub struct Sender {
-    path: String,
-    queue: Option<SyncSender<Vec<u8>>>,
-    thread: Option<JoinHandle<Ended>>,
-    outcome: Option<Ended>,
-}
-
-/// How the sending ended: how many were sent, and what went wrong.
-#[derive(Debug)]
-struct Ended {
-    sent: u64,
-    error: Option<io::Error>,
-}
-
-impl Sender {
-    /// Opens the port and starts the writing thread.
-    ///
-    /// # Errors
-    /// [`Failure::Input`] when the port cannot be opened.
-    pub fn open(name: &PortName) -> Result<Self, Failure> {
-        let port = name.open()?;
-        let (queue, sentences) = sync_channel(QUEUE);
-        let thread = std::thread::spawn(move || write_all(port, &sentences));
-        Ok(Self {
-            path: name.path.clone(),
-            queue: Some(queue),
-            thread: Some(thread),
-            outcome: None,
-        })
-    }
-
-    /// Sends one sentence. When the port has gone away the sentence is dropped, and the first time
-    /// that is noticed the text to tell the user comes back.
-    pub fn send(&mut self, sentence: &[u8]) -> Option<String> {
-        let mut sentence = sentence.to_vec();
-        // A recording is measured faster than a serial line speaks: wait for it, but not for a port
-        // that is stuck; the writing thread gives that up.
-        while let Some(queue) = &self.queue {
-            match queue.try_send(sentence) {
-                Ok(()) => return None,
-                Err(TrySendError::Full(back)) => {
-                    sentence = back;
-                    std::thread::sleep(Duration::from_millis(2));
-                }
-                Err(TrySendError::Disconnected(_)) => {
-                    self.end();
-                    return self.complaint().map(|text| {
-                        format!(
-                            "{text}; the measuring goes on, this report and later ones are not sent"
-                        )
-                    });
-                }
-            }
-        }
-        None
-    }
-
-    /// Waits until everything is written.
-    ///
-    /// # Errors
-    /// [`Failure::Input`] when the port went away before that.
-    pub fn finish(mut self) -> Result<(), Failure> {
-        self.end();
-        self.complaint()
-            .map_or(Ok(()), |text| Err(Failure::input(text)))
-    }
-
-    fn end(&mut self) {
-        self.queue = None;
-        if let Some(thread) = self.thread.take() {
-            self.outcome = thread.join().ok();
-        }
-    }
-
-    fn complaint(&self) -> Option<String> {
-        let Ended { sent, error } = self.outcome.as_ref()?;
-        let error = error.as_ref()?;
-        Some(format!(
-            "serial port {}: went away after {sent} reports ({error})",
-            self.path
-        ))
-    }
-}
-
-/// The writing thread: until the queue is closed or the port fails.
-fn write_all(mut port: Box<dyn SerialPort>, sentences: &Receiver<Vec<u8>>) -> Ended {
-    let mut sent = 0;
-    loop {
-        let outcome = match sentences.recv_timeout(STEP) {
-            Ok(sentence) => write_one(&mut port, &sentence).map(|()| sent += 1),
-            // While there is nothing to say, notice a port that has gone.
-            Err(RecvTimeoutError::Timeout) => port.bytes_to_write().map(|_| ()).map_err(Into::into),
-            Err(RecvTimeoutError::Disconnected) => return Ended { sent, error: None },
-        };
-        if let Err(error) = outcome {
-            let error = Some(error);
-            return Ended { sent, error };
-        }
-    }
-}
-
-/// Writes one sentence, however long the port takes, as long as it takes some of it.
-fn write_one(port: &mut impl Write, mut rest: &[u8]) -> io::Result<()> {
-    let mut last = Instant::now();
-    while !rest.is_empty() {
-        match port.write(rest) {
-            Ok(n) if n > 0 => {
-                rest = &rest[n..];
-                last = Instant::now();
-            }
-            Ok(_) => return Err(ErrorKind::WriteZero.into()),
-            Err(e) if may_go_on(&e) && last.elapsed() < PATIENCE => {}
-            Err(e) => return Err(e),
-        }
-    }
-    Ok(())
-}
-
-fn may_go_on(error: &io::Error) -> bool {
+/// Whether it only took too long.
+pub(crate) fn may_go_on(error: &io::Error) -> bool {
     matches!(
         error.kind(),
         ErrorKind::TimedOut | ErrorKind::WouldBlock | ErrorKind::Interrupted
@@ -274,31 +148,5 @@ mod tests {
         assert!(parse("").is_err());
         assert!(parse("/dev/ttyS0:0").is_err());
         assert!(parse("/dev/ttyS0:99999999999").is_err());
-    }
-
-    /// Takes three bytes a call, and nothing every other time.
-    struct Slow(Vec<u8>, bool);
-
-    impl Write for Slow {
-        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-            self.1 = !self.1;
-            if self.1 {
-                return Err(ErrorKind::TimedOut.into());
-            }
-            let n = bytes.len().min(3);
-            self.0.extend_from_slice(&bytes[..n]);
-            Ok(n)
-        }
-
-        fn flush(&mut self) -> io::Result<()> {
-            Ok(())
-        }
-    }
-
-    #[test]
-    fn a_slow_port_gets_everything() {
-        let mut port = Slow(Vec::new(), false);
-        write_one(&mut port, b"$RTRPT,1*00").unwrap();
-        assert_eq!(port.0, b"$RTRPT,1*00");
     }
 }

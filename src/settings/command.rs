@@ -71,6 +71,8 @@ pub enum CommandError<'a> {
     Checksum,
     /// Not printable ASCII.
     NotText,
+    /// The settings cannot be changed over this line, see [`super::Console::fixed`].
+    Fixed,
     /// The settings could not be kept; says why.
     Save(super::store::SaveError),
 }
@@ -89,6 +91,10 @@ impl fmt::Display for CommandError<'_> {
             Self::TooLong => write!(f, "line: longer than {MAX_COMMAND} characters"),
             Self::Checksum => write!(f, "line: its checksum is wrong; send it again"),
             Self::NotText => write!(f, "line: not plain text; send it again"),
+            Self::Fixed => write!(
+                f,
+                "settings: fixed here; give them to the program that measures"
+            ),
             Self::Save(error) => error.fmt(f),
         }
     }

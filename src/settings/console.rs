@@ -53,6 +53,7 @@ pub struct Console {
     board: Board,
     session: u32,
     refused: u32,
+    fixed: bool,
 }
 
 impl Console {
@@ -75,7 +76,18 @@ impl Console {
             board,
             session: started.session,
             refused: 0,
+            fixed: false,
         })
+    }
+
+    /// Refuses every command that changes or saves settings: for whoever takes them from elsewhere,
+    /// from a command line say.
+    #[must_use]
+    pub fn fixed(self) -> Self {
+        Self {
+            fixed: true,
+            ..self
+        }
     }
 
     /// The settings in use. The measuring side compares them with those it has, and starts anew
@@ -163,6 +175,9 @@ impl Console {
         store: &mut impl Keep,
     ) -> Result<Message, CommandError<'a>> {
         let message = match command {
+            Command::Set(_) | Command::Save | Command::Defaults if self.fixed => {
+                return Err(CommandError::Fixed);
+            }
             Command::Version => {
                 let [major, minor, patch] = self.board.version;
                 let format = binary::FORMAT;

@@ -14,7 +14,8 @@ use crate::output::plot::{self, Picture};
 use crate::output::progress::Progress;
 use crate::output::zone::ZoneLimits;
 use crate::output::{Out, json, text};
-use crate::serial::{PortName, Sender};
+use crate::sender::Sender;
+use crate::serial::PortName;
 use crate::tracking::Shifts;
 
 /// Options of `rowtone analyze`.
@@ -92,7 +93,13 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     }
     // A wrong ending is said before anything is measured.
     args.plot.as_deref().map_or(Ok(()), plot::check_ending)?;
-    let serial = args.serial.as_ref().map(Sender::open).transpose()?;
+    let session = session();
+    let serial = args.serial.as_ref().map(|port| {
+        // What comes through a pipe may be live, and does not wait.
+        let may_wait = !args.camera.is_pipe();
+        Sender::open(port, session, &as_a_board_says(args), may_wait)
+    });
+    let serial = serial.transpose()?;
     let shifts = Shifts::start(Feed::open(&args.camera)?)?;
     let plan = Plan::new(
         &shifts,
@@ -121,7 +128,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         out: Out::default(),
         serial,
         picture,
-        session: session(),
+        session,
         reports: 0,
     };
     let mut memory = plan.memory();
@@ -143,6 +150,19 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         )));
     }
     Ok(())
+}
+
+/// The options that are a board's settings too.
+fn as_a_board_says(args: &Args) -> rowtone::settings::Settings {
+    rowtone::settings::Settings {
+        window_s: args.window as f32,
+        hop_s: args.hop.unwrap_or(args.window / 2.0) as f32,
+        max_peaks: args.max_peaks,
+        um_per_px: args.camera.um_per_px.map(|scale| scale as f32),
+        min_hz: args.min_hz.map(|hz| hz as f32),
+        max_hz: args.max_hz.map(|hz| hz as f32),
+        ..rowtone::settings::Settings::default()
+    }
 }
 
 fn title(shifts: &Shifts) -> String {
@@ -200,8 +220,8 @@ impl Outlets {
         } else {
             None
         };
-        if let (Some(serial), Some(sentence)) = (&mut self.serial, &sentence)
-            && let Some(complaint) = serial.send(sentence.as_bytes())
+        if let (Some(serial), Some(_)) = (&mut self.serial, &sentence)
+            && let Some(complaint) = serial.send(report)
         {
             self.progress.note(&complaint);
         }
@@ -233,7 +253,11 @@ impl Outlets {
     /// Writes the picture and waits for the serial port.
     fn close(self) -> Result<(), Failure> {
         let drawn = self.picture.map_or(Ok(()), |picture| picture.save());
-        let sent = self.serial.map_or(Ok(()), Sender::finish);
-        drawn.and(sent)
+        let sent = self.serial.map_or(Ok(None), Sender::finish);
+        drawn?;
+        if let Some(note) = sent? {
+            self.progress.note(&note);
+        }
+        Ok(())
     }
 }

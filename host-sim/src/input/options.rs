@@ -151,6 +151,11 @@ impl CameraArgs {
         }
     }
 
+    /// Whether it comes through a pipe, which may be live.
+    pub fn is_pipe(&self) -> bool {
+        self.input == "-"
+    }
+
     /// What can be checked without the file.
     ///
     /// # Errors

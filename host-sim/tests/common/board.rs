@@ -1,5 +1,6 @@
 //! A board at the far end of a pseudo-terminal: the core's own end of a line, and a cable that harms
 //! what passes.
+#![allow(dead_code, reason = "each test file uses some of it")]
 
 use std::io::{ErrorKind, Read, Write};
 use std::os::fd::AsRawFd;

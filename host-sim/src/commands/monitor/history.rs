@@ -7,7 +7,7 @@ use rowtone::report::Report;
 /// Reports remembered, one row of the waterfall each.
 const ROWS: usize = 200;
 /// Amplitudes remembered of each tone.
-pub(super) const TREND: usize = 24;
+pub(super) const TREND: usize = 48;
 
 /// The last reports.
 #[derive(Debug, Default)]
@@ -41,19 +41,28 @@ impl History {
         *self = Self::default();
     }
 
-    /// The amplitudes of a track as a line of small bars, its largest the full height.
-    pub(super) fn trend(&self, track: u16) -> String {
+    /// The last amplitudes of a track as a line of small bars, so many at most. They stand for the
+    /// range from the smallest to the largest, and for 10 % around the middle at least: a change that
+    /// matters shows, and noise does not.
+    pub(super) fn trend(&self, track: u16, columns: usize) -> String {
         const BARS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
         let Some(trend) = self.trends.get(&track) else {
             return String::new();
         };
-        let largest = trend.iter().flatten().copied().fold(0.0, f32::max);
-        trend
-            .iter()
+        let shown = trend.iter().skip(trend.len().saturating_sub(columns));
+        let known = || shown.clone().flatten().copied();
+        let (low, high) = (
+            known().fold(f32::INFINITY, f32::min),
+            known().fold(0.0, f32::max),
+        );
+        let middle = f32::midpoint(low, high);
+        let half = ((high - low) / 2.0).max(0.1 * middle);
+        shown
+            .clone()
             .map(|amplitude| match amplitude {
-                Some(amplitude) if largest > 0.0 => {
-                    let step = (amplitude / largest * 8.0).ceil() as usize;
-                    BARS[step.clamp(1, 8) - 1]
+                Some(amplitude) if half > 0.0 => {
+                    let step = 4.0 + 4.0 * (amplitude - middle) / half;
+                    BARS[(step as usize).min(7)]
                 }
                 _ => ' ',
             })
@@ -91,15 +100,22 @@ mod tests {
             report.peaks[0].amplitude_px = step as f32;
             history.push(&report);
         }
-        assert_eq!(history.trend(1).chars().count(), TREND);
-        let trend = history.trend(1);
-        assert!(trend.starts_with('▂') && trend.ends_with('█'), "{trend}");
-        assert_eq!(history.trend(2), "");
+        assert_eq!(history.trend(1, TREND).chars().count(), 30);
+        let trend = history.trend(1, 8);
+        assert_eq!(trend, "▁▂▃▄▅▆▇█");
+        assert_eq!(history.trend(2, TREND), "");
         assert_eq!((history.max_hz(), history.max_amplitude_px()), (50.0, 30.0));
+        // A thousandth up and down is no trend.
+        for step in 0..8 {
+            report.peaks[0].amplitude_px = 1.0 + 0.001 * (step % 2) as f32;
+            history.push(&report);
+        }
+        let trend = history.trend(1, 8);
+        assert!(trend.chars().all(|bar| "▄▅".contains(bar)), "{trend}");
         report.peaks.clear();
         for _ in 0..TREND {
             history.push(&report);
         }
-        assert_eq!(history.trend(1), "");
+        assert_eq!(history.trend(1, TREND), "");
     }
 }

@@ -1,5 +1,6 @@
 //! `rowtone monitor`: what a board says, live in the terminal or as plain lines, and into a log.
 
+mod draw;
 mod history;
 mod log;
 mod plain;
