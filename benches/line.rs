@@ -64,6 +64,7 @@ fn lines(c: &mut Criterion) {
             vec![Default::default(); rows],
         );
         let (mut mask, mut columns) = (vec![255; width], vec![Default::default(); width]);
+        let mut fresh = vec![0; width];
         let mut scratch = vec![0.0; 2 * width];
         let storage = Storage {
             coefficients: &mut coefficients,
@@ -72,6 +73,7 @@ fn lines(c: &mut Criterion) {
             learning: &mut learning,
             mask: &mut mask,
             columns: &mut columns,
+            fresh: &mut fresh,
             scratch: &mut scratch,
         };
         let mut tracker = Tracker::new(config, storage).expect("buffers that fit");

@@ -1,61 +1,114 @@
 //! A line shifted back by its own displacement, averaged into its reference.
 
 use crate::{pixel::Pixel, reference::Recipe};
+use core::ops::Range;
 
 /// Shifts smaller than this blur nothing: the line is averaged in as it is, px.
 const STILL_PX: f32 = 0.08;
 
 /// mean(x) ← mean(x)·(1 − keep) + p(x + shift)·share: `keep` = 1/n, `share` = keep / brightness. Between
 /// pixels by Lagrange's polynomial through six; where the line does not reach, the mean stays.
-pub(crate) fn average_in<P: Pixel>(
-    mean: &mut [u16],
-    pixels: &[P],
-    shift_px: f32,
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Averaging {
     share: f32,
     keep: f32,
-    recipe: &Recipe,
-) {
-    let counts = recipe.counts_per_value;
-    let mix = |mean: &mut u16, value: f32| {
-        let old = f32::from(*mean);
-        let new = old - old * keep + value * counts * share;
-        *mean = (new + 0.5).clamp(0.0, 65535.0) as u16;
-    };
-    if shift_px.abs() < STILL_PX {
-        for (m, p) in mean.iter_mut().zip(pixels) {
-            mix(m, f32::from(p.value()));
+    counts_per_value: f32,
+    stride: usize,
+    /// From a column to the first of its six pixels; `None` where each column takes its own pixel.
+    taps: Option<(isize, [f32; 6])>,
+    /// The columns that the line reaches.
+    from: usize,
+    to: usize,
+}
+
+impl Averaging {
+    /// For a line of `width` pixels that is shifted by `shift_px`.
+    pub(crate) fn new(shift_px: f32, share: f32, keep: f32, recipe: &Recipe, width: usize) -> Self {
+        let mut averaging = Self {
+            share,
+            keep,
+            counts_per_value: recipe.counts_per_value,
+            stride: recipe.stride,
+            taps: None,
+            from: 0,
+            to: width,
+        };
+        if shift_px.abs() >= STILL_PX {
+            let stride = recipe.stride as isize;
+            let steps = shift_px / recipe.stride as f32;
+            let whole = libm::floorf(steps);
+            // As far as that, and where nothing is known, no pixel of the line is of use.
+            if whole.is_nan() || whole.abs() > width as f32 {
+                averaging.to = 0;
+                return averaging;
+            }
+            let offset = whole as isize * stride;
+            // Where all six taps are inside the line.
+            let (before, after) = (2 * stride, 3 * stride);
+            let first = offset - before;
+            let end = width as isize - after - offset;
+            averaging.from = (-first).max(0) as usize;
+            averaging.to = end.clamp(0, width as isize) as usize;
+            averaging.taps = Some((first, lagrange(steps - whole)));
         }
-        return;
+        averaging
     }
-    let stride = recipe.stride;
-    let steps = shift_px / stride as f32;
-    let whole = libm::floorf(steps);
-    // As far as that, and where nothing is known, no pixel of the line is of use.
-    if whole.is_nan() || whole.abs() > pixels.len() as f32 {
-        return;
+
+    #[inline(always)]
+    fn mix(&self, mean: &mut u16, value: f32) {
+        let old = f32::from(*mean);
+        let new = old - old * self.keep + value * self.counts_per_value * self.share;
+        *mean = (new + 0.5).clamp(0.0, 65535.0) as u16;
     }
-    let weights = lagrange(steps - whole);
-    let offset = whole as isize * stride as isize;
-    // Where all six taps are inside the line.
-    let (before, after) = (2 * stride as isize, 3 * stride as isize);
-    let from = (before - offset).max(0) as usize;
-    let to = (pixels.len() as isize - after - offset).clamp(0, mean.len() as isize) as usize;
-    let first = from as isize + offset - before;
-    let (Some(mean), Ok(first)) = (mean.get_mut(from..to.max(from)), usize::try_from(first)) else {
-        return;
-    };
-    let Some(line) = pixels.get(first..) else {
-        return;
-    };
-    let tap = |k: usize| line.get(k * stride..).unwrap_or(&[]).iter();
-    let [a, b, c, d, e, f] = weights;
-    let pairs = [tap(0).zip(tap(1)), tap(2).zip(tap(3)), tap(4).zip(tap(5))];
-    let [first, second, third] = pairs;
-    for (m, ((ab, cd), ef)) in mean.iter_mut().zip(first.zip(second).zip(third)) {
-        let v = |p: &P| f32::from(p.value());
-        let value =
-            a * v(ab.0) + b * v(ab.1) + c * v(cd.0) + d * v(cd.1) + e * v(ef.0) + f * v(ef.1);
-        mix(m, value);
+
+    /// Averages the whole line in.
+    pub(crate) fn all<P: Pixel>(&self, mean: &mut [u16], pixels: &[P]) {
+        let Some((first, weights)) = self.taps else {
+            for (m, p) in mean.iter_mut().take(self.to).zip(pixels) {
+                self.mix(m, f32::from(p.value()));
+            }
+            return;
+        };
+        let Ok(first) = usize::try_from(self.from as isize + first) else {
+            return;
+        };
+        let (Some(mean), Some(line)) = (
+            mean.get_mut(self.from..self.to.max(self.from)),
+            pixels.get(first..),
+        ) else {
+            return;
+        };
+        let tap = |k: usize| line.get(k * self.stride..).unwrap_or(&[]).iter();
+        let [a, b, c, d, e, f] = weights;
+        let pairs = [tap(0).zip(tap(1)), tap(2).zip(tap(3)), tap(4).zip(tap(5))];
+        let [first, second, third] = pairs;
+        for (m, ((ab, cd), ef)) in mean.iter_mut().zip(first.zip(second).zip(third)) {
+            let v = |p: &P| f32::from(p.value());
+            let value =
+                a * v(ab.0) + b * v(ab.1) + c * v(cd.0) + d * v(cd.1) + e * v(ef.0) + f * v(ef.1);
+            self.mix(m, value);
+        }
+    }
+
+    /// Averages the columns of `span` in; the line was kept by [`Pixel::pack`].
+    pub(crate) fn some<P: Pixel>(&self, span: Range<usize>, mean: &mut [u16], line: &[f32]) {
+        let v = |x: usize| f32::from(P::unpack(line, x));
+        for x in span.start.max(self.from)..span.end.min(self.to) {
+            let Some(m) = mean.get_mut(x) else { return };
+            let value = match self.taps {
+                None => v(x),
+                Some((first, [a, b, c, d, e, f])) => {
+                    let (at, by) = (x.wrapping_add_signed(first), self.stride);
+                    a * v(at)
+                        + b * v(at + by)
+                        + c * v(at + 2 * by)
+                        + d * v(at + 3 * by)
+                        + e * v(at + 4 * by)
+                        + f * v(at + 5 * by)
+                }
+            };
+            self.mix(m, value);
+        }
     }
 }
 
@@ -113,7 +166,7 @@ pub(crate) fn lagrange(t: f32) -> [f32; 6] {
 
 #[cfg(test)]
 mod tests {
-    use super::{Recipe, average_in, lagrange, move_row_by};
+    use super::{Averaging, Recipe, lagrange, move_row_by};
 
     #[test]
     fn polynomials_of_fifth_degree_are_exact() {
@@ -124,6 +177,35 @@ mod tests {
                 .map(|(x, w)| w * p(f32::from(x)))
                 .sum();
             assert!((value - p(t)).abs() < 1e-5, "{t}");
+        }
+    }
+
+    #[test]
+    fn some_columns_at_a_time_are_the_whole_line() {
+        use crate::pixel::Pixel;
+        let recipe = Recipe {
+            level: crate::band::Level::Fine,
+            stride: 1,
+            margin_px: 0,
+            noise: crate::noise::PixelNoise::guess(256.0),
+            counts_per_value: 128.0,
+            saturation: 254.0,
+            kernel: crate::kernel::Kernel::PORTABLE,
+        };
+        let line: [u8; 37] = core::array::from_fn(|x| (x * x * 7 % 251) as u8);
+        let mut kept = [0.0; 74];
+        u8::pack(&line, &mut kept);
+        for shift_px in [0.0, 0.05, 0.3, -0.6, 5.2, -7.9, 30.0] {
+            for stride in [1, 2] {
+                let recipe = Recipe { stride, ..recipe };
+                let averaging = Averaging::new(shift_px, 0.21, 0.2, &recipe, 37);
+                let (mut at_once, mut in_steps) = ([9000; 37], [9000; 37]);
+                averaging.all(&mut at_once, &line);
+                for start in (0..37).step_by(5) {
+                    averaging.some::<u8>(start..start + 5, &mut in_steps, &kept);
+                }
+                assert_eq!(at_once, in_steps, "{shift_px} {stride}");
+            }
         }
     }
 
@@ -142,7 +224,9 @@ mod tests {
             for shift in [33.0, 1e6, 1e19, f32::MAX, f32::INFINITY, f32::NAN] {
                 for shift in [shift, -shift] {
                     let mut mean = [777; 32];
-                    average_in(&mut mean, &[200u8; 32], shift, 0.5, 0.5, &recipe(stride));
+                    let averaging = Averaging::new(shift, 0.5, 0.5, &recipe(stride), 32);
+                    averaging.all(&mut mean, &[200u8; 32]);
+                    averaging.some::<u8>(0..32, &mut mean, &[0.0; 8]);
                     assert_eq!(mean, [777; 32], "{shift}");
                 }
             }

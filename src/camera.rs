@@ -60,8 +60,11 @@ impl Timing {
     }
 
     /// Start of exposure of `row` after that of row 0, ns, rounded down.
+    #[inline]
     pub const fn start_ns(&self, row: u16) -> i64 {
-        (row as u64 * self.line_time_ps as u64 / 1000) as i64
+        // Whole ns and the rest apart: a microcontroller asks for every line, and divides 64 bits slowly.
+        let (ns, ps) = (self.line_time_ps / 1000, self.line_time_ps % 1000);
+        (row as u64 * ns as u64 + (row as u32 * ps / 1000) as u64) as i64
     }
 
     /// Middle of exposure of `row` after the start of exposure of row 0, ns: the sample time.

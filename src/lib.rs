@@ -49,7 +49,7 @@
 //! let (mut coefficients, mut mean) = ([0; WIDTH * ROWS], [0; WIDTH * ROWS]);
 //! let (mut tables, mut learning) = ([Default::default(); ROWS], [Default::default(); ROWS]);
 //! let (mut mask, mut columns) = ([255; WIDTH], [Default::default(); WIDTH]);
-//! let mut scratch = [0.0; 2 * WIDTH];
+//! let (mut fresh, mut scratch) = ([0; WIDTH], [0.0; 2 * WIDTH]);
 //! let mut tracker = Tracker::new(config, Storage {
 //!     coefficients: &mut coefficients,
 //!     tables: &mut tables,
@@ -57,6 +57,7 @@
 //!     learning: &mut learning,
 //!     mask: &mut mask,
 //!     columns: &mut columns,
+//!     fresh: &mut fresh,
 //!     scratch: &mut scratch,
 //! })?;
 //! let swing = |ns: i64| 0.2 * (core::f32::consts::TAU * 7.0 * ns as f32 * 1e-9).sin();

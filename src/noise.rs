@@ -12,6 +12,9 @@ pub struct PixelNoise {
     pub per_value: f32,
 }
 
+/// That of quantisation: no pixel's variance is below it.
+pub(crate) const LEAST_VARIANCE: f32 = 1.0 / 12.0;
+
 impl PixelNoise {
     /// Before it was measured: 1/128 of the range of `values`.
     pub(crate) fn guess(values: f32) -> Self {
@@ -23,7 +26,7 @@ impl PixelNoise {
 
     /// Variance of a pixel of this value; never below that of quantisation, 1/12.
     pub fn variance(&self, value: f32) -> f32 {
-        (self.dark + self.per_value * value.max(0.0)).max(1.0 / 12.0)
+        (self.dark + self.per_value * value.max(0.0)).max(LEAST_VARIANCE)
     }
 }
 

@@ -107,6 +107,7 @@ fn nothing_is_allocated_from_lines_to_bytes() {
     let mut learning = [RowLearning::default(); ROWS];
     let mut mask = [255u8; WIDTH];
     let mut columns = [ColumnLearning::default(); WIDTH];
+    let mut fresh = [0i8; WIDTH];
     let mut scratch = [0.0f32; 2 * WIDTH];
     let mut spectrum = StaticStorage::<2048, 64, 16, 1024, 5>::new();
     let mut halves = StaticStorage::<2048, 64, 16, 1024, 5>::new();
@@ -130,6 +131,7 @@ fn nothing_is_allocated_from_lines_to_bytes() {
                 learning: &mut learning,
                 mask: &mut mask,
                 columns: &mut columns,
+                fresh: &mut fresh,
                 scratch: &mut scratch,
             };
             let mut tracker = Tracker::new(config, storage).unwrap();

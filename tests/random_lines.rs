@@ -21,6 +21,7 @@ struct Memory {
     learning: Vec<RowLearning>,
     mask: Vec<u8>,
     columns: Vec<ColumnLearning>,
+    fresh: Vec<i8>,
     scratch: Vec<f32>,
 }
 
@@ -33,6 +34,7 @@ impl Memory {
             learning: vec![RowLearning::default(); rows],
             mask,
             columns: vec![ColumnLearning::default(); width],
+            fresh: vec![0; width],
             scratch: vec![0.0; 2 * width],
         }
     }
@@ -45,6 +47,7 @@ impl Memory {
             learning: &mut self.learning,
             mask: &mut self.mask,
             columns: &mut self.columns,
+            fresh: &mut self.fresh,
             scratch: &mut self.scratch,
         }
     }

@@ -50,6 +50,13 @@ impl RowTable {
         f32::from_bits(u32::from(self.information) << 16)
     }
 
+    /// The row can be measured.
+    #[inline]
+    pub(crate) fn has_texture(&self) -> bool {
+        // No negative zero is ever stored.
+        self.information != 0
+    }
+
     /// Σ r over the whole row, in pixel values.
     pub fn pixel_sum(&self) -> f32 {
         self.pixel_sum

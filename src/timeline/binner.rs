@@ -179,12 +179,17 @@ impl core::error::Error for BinnerError {}
 struct Open {
     frame: u32,
     slot: u16,
+    /// First row of the group and how many it should have.
+    first_row: u16,
+    rows_due: u16,
+    /// Rows taken.
     rows: u16,
     first_ns: i64,
     information: f32,
     weighted_shift: f32,
     weighted_ns: f32,
-    /// Σ w·x, w·x², w·x³; x in rows from the group's middle.
+    /// Σ w·x, w·x², w·x³; x in rows from the group's middle, which is at this row.
+    middle_row: f32,
     moments: [f32; 3],
 }
 
@@ -199,6 +204,46 @@ impl Open {
             third_ns3: third * line_ns * line_ns * line_ns,
         }
     }
+}
+
+impl Open {
+    /// Takes one row of this group.
+    #[inline(always)]
+    fn add(&mut self, d: &Displacement) {
+        let information = if d.information_per_px2 < MOST_INFORMATION {
+            d.information_per_px2
+        } else {
+            MOST_INFORMATION
+        };
+        // A group lasts some ms; converting 64 bits takes a microcontroller long.
+        let later_ns = d.time_ns.wrapping_sub(self.first_ns);
+        let later_ns = if later_ns == i64::from(later_ns as i32) {
+            later_ns as i32 as f32
+        } else {
+            much_later_ns(d.time_ns, self.first_ns)
+        };
+        self.rows = self.rows.saturating_add(1);
+        self.information += information;
+        self.weighted_shift += information * d.shift_px;
+        self.weighted_ns += information * later_ns;
+        let x = f32::from(d.row) - self.middle_row;
+        let mut power = information;
+        for moment in &mut self.moments {
+            power *= x;
+            *moment += power;
+        }
+    }
+}
+
+#[cold]
+#[inline(never)]
+fn much_later_ns(time_ns: i64, first_ns: i64) -> f32 {
+    time_ns.saturating_sub(first_ns) as f32
+}
+
+/// A row of which something is known.
+fn is_known(information: f32, shift_px: f32) -> bool {
+    information > 0.0 && information.is_finite() && shift_px.is_finite()
 }
 
 /// Combines rows to samples.
@@ -242,47 +287,68 @@ impl Binner {
     /// Takes one row; gives the group before it, if this row begins another.
     ///
     /// A row that knows nothing (information not greater than 0, or anything not finite) is skipped.
+    #[inline(always)]
     pub fn push(&mut self, displacement: Displacement) -> Option<Sample> {
-        let d = displacement;
+        let known = is_known(displacement.information_per_px2, displacement.shift_px);
+        if known && displacement.row < self.group.timing.rows() {
+            return self.push_sound(displacement);
+        }
+        self.skip(&displacement)
+    }
+
+    /// Counts a row of which nothing is known, and ends the group that it does not belong to.
+    #[cold]
+    fn skip(&mut self, d: &Displacement) -> Option<Sample> {
         self.count_lost(d.frame);
         let slot = d.row / self.group.rows_per_sample;
-        let done = match self.open {
+        match self.open {
             Some(open) if open.frame == d.frame && open.slot == slot => None,
             _ => self.finish(),
-        };
-        let known = d.information_per_px2 > 0.0 && d.information_per_px2.is_finite();
-        if !known || !d.shift_px.is_finite() || d.row >= self.group.timing.rows() {
-            return done;
         }
-        let information = d.information_per_px2.min(MOST_INFORMATION);
-        let open = self.open.get_or_insert(Open {
+    }
+
+    /// [`Binner::push`] for a row of this timing whose shift and information are finite and greater than 0.
+    #[inline(always)]
+    pub(crate) fn push_sound(&mut self, d: Displacement) -> Option<Sample> {
+        if let Some(open) = &mut self.open
+            && open.frame == d.frame
+            && d.row.wrapping_sub(open.first_row) < open.rows_due
+        {
+            open.add(&d);
+            return None;
+        }
+        self.begin(d)
+    }
+
+    /// Gives the group before, and begins the next with this row.
+    #[inline(never)]
+    fn begin(&mut self, d: Displacement) -> Option<Sample> {
+        self.count_lost(d.frame);
+        let slot = d.row / self.group.rows_per_sample;
+        let done = self.finish();
+        let mut open = Open {
             frame: d.frame,
             slot,
+            first_row: slot * self.group.rows_per_sample,
+            rows_due: self.group.rows_of(slot),
             rows: 0,
             first_ns: d.time_ns,
             information: 0.0,
             weighted_shift: 0.0,
             weighted_ns: 0.0,
+            middle_row: f32::from(slot * self.group.rows_per_sample)
+                + 0.5 * f32::from(self.group.rows_per_sample - 1),
             moments: [0.0; 3],
-        });
-        open.rows = open.rows.saturating_add(1);
-        open.information += information;
-        open.weighted_shift += information * d.shift_px;
-        open.weighted_ns += information * d.time_ns.saturating_sub(open.first_ns) as f32;
-        let x = f32::from(d.row - slot * self.group.rows_per_sample)
-            - 0.5 * f32::from(self.group.rows_per_sample - 1);
-        let mut power = information;
-        for moment in &mut open.moments {
-            power *= x;
-            *moment += power;
-        }
+        };
+        open.add(&d);
+        self.open = Some(open);
         done
     }
 
     /// Gives the group being filled: at the end of the input.
     pub fn finish(&mut self) -> Option<Sample> {
         let open = self.open.take()?;
-        if 2 * u32::from(open.rows) < u32::from(self.group.rows_of(open.slot)) {
+        if 2 * u32::from(open.rows) < u32::from(open.rows_due) {
             self.thin_groups = self.thin_groups.saturating_add(1);
             return None;
         }

@@ -150,12 +150,12 @@ impl Tracker<'_> {
         let whole = nearest_step(shift_px, stride);
         let overlap = Overlap::new(width, whole)?;
         let coefficients = self.storage.coefficients.get(row * width..)?.get(..width)?;
-        let sums = P::sums(
+        let (product, _) = P::sums(
             self.config.kernel,
             pixels.get(overlap.line)?,
             coefficients.get(overlap.reference)?,
         );
-        let product = sums.product as f32 * self.to_reference;
+        let product = product * self.to_reference;
         let near = table.shift_of_smeared_px(product, smear.variance_px2, smear.skew_px3);
         let unsmeared_px = whole as f32 + near;
         // A correction beyond this is no correction: the expansion does not hold, or the speed is wrong.

@@ -24,7 +24,10 @@ pub struct Config {
     /// How far a lost picture is searched for, px either way; at most a third of the width counts.
     pub search_px: u16,
     /// Columns of coefficients that are built anew in one line time: what a line may cost beside its own
-    /// measurement.
+    /// measurement. `u16::MAX`: as much as it likes. With fewer, all that a line may need while measuring (not
+    /// while learning) is bounded: a row's
+    /// reference grows over many lines, a lost picture is searched for at one place a line, and a line that
+    /// would need more is called disturbed.
     pub columns_per_line: u16,
     /// Which implementation of the inner product.
     pub kernel: Kernel,
@@ -48,7 +51,7 @@ impl Config {
     }
 }
 
-/// Memory of a tracker, lent by the caller: 3·width + 24 bytes a row, and 15 bytes a column. The line
+/// Memory of a tracker, lent by the caller: 3·width + 24 bytes a row, and 16 bytes a column. The line
 /// path itself reads width + 16 bytes a row.
 #[derive(Debug)]
 pub struct Storage<'a> {
@@ -65,6 +68,8 @@ pub struct Storage<'a> {
     pub mask: &'a mut [u8],
     /// width: what learning needs of the columns.
     pub columns: &'a mut [ColumnLearning],
+    /// width: the coefficients of a row that is being built anew while its old ones still serve.
+    pub fresh: &'a mut [i8],
     /// 2 × width: scratch of building coefficients.
     pub scratch: &'a mut [f32],
 }
@@ -137,6 +142,7 @@ impl Config {
             learning: cut("learning", storage.learning, rows)?,
             mask: cut("mask", storage.mask, width)?,
             columns: cut("columns", storage.columns, width)?,
+            fresh: cut("fresh", storage.fresh, width)?,
             scratch: cut("scratch", storage.scratch, 2 * width)?,
         })
     }

@@ -1,8 +1,6 @@
 //! Every line is counted, whatever became of it.
 
-use super::Outcome;
-
-/// What became of the lines since the tracker was made. All saturate.
+/// What became of the lines since the tracker was made. (64 bits do not run out.)
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
     /// Measured.
@@ -17,18 +15,4 @@ pub struct Counts {
     pub misfit: u64,
     /// How often the scene changed and the reference was learned anew.
     pub relearned: u32,
-}
-
-impl Counts {
-    #[inline]
-    pub(super) fn add(&mut self, outcome: &Outcome) {
-        let count = match outcome {
-            Outcome::Measured(_) => &mut self.measured,
-            Outcome::Learning => &mut self.learning,
-            Outcome::NoTexture => &mut self.no_texture,
-            Outcome::Disturbed => &mut self.disturbed,
-            Outcome::Misfit => &mut self.misfit,
-        };
-        *count = count.saturating_add(1);
-    }
 }

@@ -1,26 +1,62 @@
 //! The reference follows the picture, slowly: light and focus change, and things creep.
+//!
+//! None of it is done in one line time: a row in its turn is averaged, and its coefficients are built anew,
+//! some columns beside each line, while the old coefficients still serve; a whole reference is moved one
+//! row beside each line.
 
 use super::{RowLearning, Stage, Tracker};
-use crate::reference::{Build, Parts};
+use crate::{
+    align::Averaging,
+    pixel::Pixel,
+    reference::{Build, Parts},
+};
 
 /// What following remembers.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Follow {
-    /// A row whose coefficients are being built anew.
-    work: Option<(usize, Build)>,
+    /// What is under way; no more than one thing is.
+    work: Work,
     /// Where the picture is on average, px: a mean over some seconds.
     drift_px: f32,
     /// By how much the reference was moved after a creeping picture, px.
     anchor_px: i32,
 }
 
+/// What is under way.
+#[derive(Clone, Copy, Debug, Default)]
+enum Work {
+    #[default]
+    Nothing,
+    /// A line, kept in the scratch, is averaged into its row; the next column.
+    Average {
+        row: usize,
+        averaging: Averaging,
+        column: usize,
+    },
+    /// The row's coefficients are built anew.
+    Build { row: usize, build: Build },
+    /// All rows are moved to the right by `by_px`; those from `next` on are still where they were.
+    Move { by_px: i32, next: usize },
+}
+
 /// One row in so many frames takes a little of the picture: building its coefficients anew is what costs.
 const FRAMES_A_ROW: u32 = 4;
 
+/// The reference forgets over so many turns of a row.
+const MEMORY_FRAMES: u16 = 32;
+
 impl Follow {
-    #[inline]
+    #[inline(always)]
     pub(super) fn anchor_px(&self) -> f32 {
         self.anchor_px as f32
+    }
+
+    pub(super) fn is_busy(&self) -> bool {
+        !matches!(self.work, Work::Nothing)
+    }
+
+    pub(super) fn is_moving(&self) -> bool {
+        matches!(self.work, Work::Move { .. })
     }
 }
 
@@ -34,7 +70,7 @@ const CREEP_PX: f32 = 1.5;
 impl Tracker<'_> {
     /// The row whose turn it is in this frame; rows far apart follow each other.
     pub(super) fn turn_of(&self, frame: u32) -> usize {
-        let free = self.stage == Stage::Tracking && self.follow.work.is_none();
+        let free = self.stage == Stage::Tracking && !self.follow.is_busy();
         if !free || !frame.is_multiple_of(FRAMES_A_ROW) {
             return usize::MAX;
         }
@@ -42,97 +78,130 @@ impl Tracker<'_> {
         (frame / FRAMES_A_ROW).wrapping_mul(619) as usize % usize::from(self.config.rows)
     }
 
-    /// Goes on with the row whose coefficients are being built anew, some columns a line; a row that is
-    /// about to be measured is finished first.
-    #[inline]
-    pub(super) fn follow_one_step(&mut self, row: usize) {
-        if let Some((at, build)) = self.follow.work {
-            self.step(at, build, at == row);
+    /// The reference of a row that was looked at and fitted is to take a little of it.
+    pub(super) fn follow_row<P: Pixel>(&mut self, row: usize, pixels: &[P], shift_px: f32) {
+        if self.follow.is_busy() {
+            return;
+        }
+        P::pack(pixels, self.storage.scratch);
+        if let Some(averaging) = self.averaging(row, pixels.len(), shift_px, MEMORY_FRAMES) {
+            self.follow.work = Work::Average {
+                row,
+                averaging,
+                column: 0,
+            };
         }
     }
 
-    #[cold]
-    fn step(&mut self, row: usize, mut build: Build, to_the_end: bool) {
+    /// Goes on with what is under way, some columns or one row a line. Returns by how much the reference of
+    /// `row` lies to the left of where the other rows' lies, px.
+    pub(super) fn follow_one_step<P: Pixel>(&mut self, row: usize) -> f32 {
         let width = usize::from(self.config.width);
-        let span = row * width..(row + 1) * width;
-        let columns = usize::from(self.config.columns_per_line);
+        let columns = usize::from(self.config.columns_per_line).max(1);
         let s = &mut self.storage;
-        let (Some(mean), Some(coefficients), Some(slot)) = (
-            s.mean.get(span.clone()),
-            s.coefficients.get_mut(span),
-            s.tables.get_mut(row),
-        ) else {
-            self.follow.work = None;
-            return;
-        };
-        let mut parts = Parts {
-            mean,
-            mask: s.mask,
-            scratch: s.scratch,
-            coefficients,
-        };
-        let table = if to_the_end {
-            Some(build.all(&mut parts))
-        } else {
-            build.advance(columns, &mut parts)
-        };
-        match table {
-            Some(table) => {
-                *slot = table;
-                self.follow.work = None;
+        match &mut self.follow.work {
+            Work::Nothing => {}
+            Work::Average {
+                row,
+                averaging,
+                column,
+            } => {
+                let row = *row;
+                let span = *column..column.saturating_add(columns).min(width);
+                *column = span.end;
+                if let Some(mean) = s.mean.get_mut(row * width..(row + 1) * width) {
+                    averaging.some::<P>(span.clone(), mean, s.scratch);
+                }
+                if span.end == width {
+                    let build = self.build_of(row);
+                    self.follow.work = Work::Build { row, build };
+                }
             }
-            None => self.follow.work = Some((row, build)),
+            Work::Build { row, build } => {
+                let span = *row * width..(*row + 1) * width;
+                let Some(mean) = s.mean.get(span.clone()) else {
+                    self.follow.work = Work::Nothing;
+                    return 0.0;
+                };
+                let parts = &mut Parts {
+                    mean,
+                    mask: s.mask,
+                    scratch: s.scratch,
+                    coefficients: s.fresh,
+                };
+                if let Some(table) = build.advance(columns, parts) {
+                    if let (Some(coefficients), Some(slot)) =
+                        (s.coefficients.get_mut(span), s.tables.get_mut(*row))
+                    {
+                        coefficients.copy_from_slice(s.fresh);
+                        *slot = table;
+                    }
+                    self.follow.work = Work::Nothing;
+                }
+            }
+            Work::Move { by_px, next } => {
+                let by_px = *by_px;
+                let span = *next * width..(*next + 1) * width;
+                if let (Some(coefficients), Some(mean)) =
+                    (s.coefficients.get_mut(span.clone()), s.mean.get_mut(span))
+                {
+                    move_row(coefficients, by_px);
+                    move_row(mean, by_px);
+                }
+                *next += 1;
+                let left = row >= *next;
+                if *next >= usize::from(self.config.rows) {
+                    self.follow.work = Work::Nothing;
+                }
+                return if left { by_px as f32 } else { 0.0 };
+            }
         }
+        0.0
+    }
+
+    fn build_of(&self, row: usize) -> Build {
+        let learning = self.storage.learning.get(row);
+        let frames = learning.map_or(1, RowLearning::frames);
+        Build::new(&self.recipe, f32::from(frames))
     }
 
     /// Builds a row's coefficients from its mean, in one go.
     pub(super) fn build(&mut self, row: usize) {
-        let frames = self
-            .storage
-            .learning
-            .get(row)
-            .map_or(1, RowLearning::frames);
-        let build = Build::new(&self.recipe, f32::from(frames));
-        self.step(row, build, true);
-    }
-
-    /// Begins to build a row anew, unless another one is under way.
-    pub(super) fn begin_build(&mut self, row: usize) {
-        if self.follow.work.is_none() {
-            let frames = self
-                .storage
-                .learning
-                .get(row)
-                .map_or(1, RowLearning::frames);
-            self.follow.work = Some((row, Build::new(&self.recipe, f32::from(frames))));
+        let build = self.build_of(row);
+        let width = usize::from(self.config.width);
+        let span = row * width..(row + 1) * width;
+        let s = &mut self.storage;
+        if let (Some(mean), Some(coefficients), Some(slot)) = (
+            s.mean.get(span.clone()),
+            s.coefficients.get_mut(span),
+            s.tables.get_mut(row),
+        ) {
+            *slot = build.all(&mut Parts {
+                mean,
+                mask: s.mask,
+                scratch: s.scratch,
+                coefficients,
+            });
         }
     }
 
-    /// Once a frame: moves the whole reference by whole pixels after a picture that creeps.
+    /// Once a frame: has the whole reference moved by whole pixels after a picture that creeps.
     pub(super) fn follow_drift(&mut self) {
         if !self.prediction.is_sure() || self.stage != Stage::Tracking {
             return;
         }
         let here = self.prediction.at(0);
         self.follow.drift_px += (here - self.follow.drift_px) / DRIFT_FRAMES;
-        if self.follow.drift_px.abs() < CREEP_PX {
+        if self.follow.drift_px.abs() < CREEP_PX || self.follow.is_moving() {
             return;
         }
         let stride = i32::from(self.config.stride);
-        let by = stride * if self.follow.drift_px > 0.0 { 1 } else { -1 };
-        if let Some((row, build)) = self.follow.work {
-            self.step(row, build, true);
-        }
-        let width = usize::from(self.config.width);
-        for row in self.storage.coefficients.chunks_exact_mut(width) {
-            move_row(row, by);
-        }
-        for row in self.storage.mean.chunks_exact_mut(width) {
-            move_row(row, by);
-        }
-        self.follow.anchor_px = self.follow.anchor_px.saturating_add(by);
-        self.follow.drift_px -= by as f32;
-        self.prediction.move_by(-by as f32);
+        let by_px = stride * if self.follow.drift_px > 0.0 { 1 } else { -1 };
+        // A row that is being followed will have another turn.
+        self.follow.work = Work::Move { by_px, next: 0 };
+        self.follow.anchor_px = self.follow.anchor_px.saturating_add(by_px);
+        self.follow.drift_px -= by_px as f32;
+        self.prediction.move_by(-by_px as f32);
     }
 }
 

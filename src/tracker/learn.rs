@@ -2,7 +2,7 @@
 
 use super::{Found, Stage, Tracker, follow::Follow, predict::Prediction, watch::Watch};
 use crate::{
-    align,
+    align::{self, Averaging},
     band::{Level, MAX_HALF},
     noise::NoiseMeter,
     noise::PixelNoise,
@@ -38,9 +38,6 @@ impl RowLearning {
 
 /// A row that knows its shift no better than this is aligned like its neighbours, 1/px².
 const OWN_INFORMATION_PER_PX2: f32 = 25.0;
-
-/// While tracking, the reference forgets over so many turns of a row.
-const MEMORY_FRAMES: u16 = 32;
 
 /// Rows on which the levels of the band are tried.
 const TRIAL_ROWS: usize = 24;
@@ -111,23 +108,22 @@ impl Tracker<'_> {
     }
 
     /// Aligns a line and averages it into its reference.
-    pub(super) fn learn<P: Pixel>(&mut self, row: usize, pixels: &[P]) {
-        let first = self.frames_in_stage <= 1 && self.stage == Stage::Rough;
-        let mut shift_px = 0.0;
+    ///
+    /// `found`: its own shift. In the first frame nothing is known, so no row has texture: it is not moved.
+    #[cold]
+    pub(super) fn learn<P: Pixel>(&mut self, row: usize, pixels: &[P], found: Found) {
         let mut textured = false;
-        if !first {
-            shift_px = match self.locate(row, pixels) {
-                Found::At {
-                    shift_px,
-                    information_per_px2,
-                } if information_per_px2 > OWN_INFORMATION_PER_PX2 => {
-                    textured = true;
-                    shift_px
-                }
-                Found::At { .. } | Found::NoTexture => self.prediction.at(row),
-                Found::Disturbed => return,
-            };
-        }
+        let shift_px = match found {
+            Found::At {
+                shift_px,
+                information_per_px2,
+            } if information_per_px2 > OWN_INFORMATION_PER_PX2 => {
+                textured = true;
+                shift_px
+            }
+            Found::At { .. } | Found::NoTexture => self.prediction.at(row),
+            Found::Disturbed => return,
+        };
         let Some(&seen) = self.storage.learning.get(row) else {
             return;
         };
@@ -154,20 +150,25 @@ impl Tracker<'_> {
         }
     }
 
-    /// While tracking: the reference of a row that was looked at and fitted takes a little of it.
-    pub(super) fn follow_row<P: Pixel>(&mut self, row: usize, pixels: &[P], shift_px: f32) {
-        self.average(row, pixels, shift_px, MEMORY_FRAMES);
-        self.begin_build(row);
-    }
-
     fn average<P: Pixel>(&mut self, row: usize, pixels: &[P], shift_px: f32, memory: u16) {
-        let width = pixels.len();
-        let (Some(mean), Some(learning)) = (
-            self.storage.mean.get_mut(row * width..(row + 1) * width),
-            self.storage.learning.get_mut(row),
-        ) else {
+        let Some(averaging) = self.averaging(row, pixels.len(), shift_px, memory) else {
             return;
         };
+        let width = pixels.len();
+        if let Some(mean) = self.storage.mean.get_mut(row * width..(row + 1) * width) {
+            averaging.all(mean, pixels);
+        }
+    }
+
+    /// How the present line is to be averaged into its row; the row is counted to have seen it.
+    pub(super) fn averaging(
+        &mut self,
+        row: usize,
+        width: usize,
+        shift_px: f32,
+        memory: u16,
+    ) -> Option<Averaging> {
+        let learning = self.storage.learning.get_mut(row)?;
         learning.frames = learning.frames.saturating_add(1).min(memory);
         let keep = 1.0 / f32::from(learning.frames);
         // A line ten times darker than its reference is no measure of brightness.
@@ -176,7 +177,8 @@ impl Tracker<'_> {
             _ => 1.0,
         };
         learning.light += (1.0 / bright - learning.light) * keep;
-        align::average_in(mean, pixels, shift_px, keep * bright, keep, &self.recipe);
+        let recipe = &self.recipe;
+        Some(Averaging::new(shift_px, keep * bright, keep, recipe, width))
     }
 
     pub(super) fn measure_noise<P: Pixel>(

@@ -32,10 +32,10 @@ use crate::{
     noise::{NoiseMeter, PixelNoise},
     pixel::Pixel,
     reference::{Recipe, RowTable},
-    timeline::Displacement,
+    timeline::{Binner, Displacement, Sample},
 };
 use blur::Blur;
-use flicker::Flicker;
+use flicker::{Flicker, STEEPEST};
 use follow::Follow;
 use overlap::{Overlap, nearest_step};
 use predict::Prediction;
@@ -91,6 +91,14 @@ pub struct Tracker<'a> {
     follow: Follow,
     /// The row of this frame from which the reference is followed; none while learning.
     turn: usize,
+    /// There is something to be done beside the next line: the reference is followed, or a lost picture
+    /// is looked for.
+    beside: bool,
+    /// The row from which on the next line is looked at.
+    attend: usize,
+    /// Half the pixels from one to the next of the same colour, and [`NEAR_PX`] of them.
+    half_step_px: f32,
+    near_px: f32,
     counts: Counts,
 }
 
@@ -104,6 +112,19 @@ enum Found {
     NoTexture,
     Disturbed,
 }
+
+/// Why a line has no shift.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Unfound {
+    /// The result is no finite number.
+    NoNumber,
+    /// It would take more inner products than there is time for; where it seemed to be so far, px.
+    Unfinished(f32),
+}
+
+/// Inner products that a line may take: as it likes, and where a line time is short.
+const TURNS: u8 = 6;
+const TURNS_IN_A_HURRY: u8 = 2;
 
 /// Beyond this the row's polynomial is left for the next whole shift, px.
 const NEAR_PX: f32 = 0.7;
@@ -145,6 +166,10 @@ impl<'a> Tracker<'a> {
             watch: Watch::default(),
             follow: Follow::default(),
             turn: usize::MAX,
+            beside: false,
+            attend: 0,
+            half_step_px: 0.5 * f32::from(config.stride),
+            near_px: NEAR_PX * f32::from(config.stride),
             counts: Counts::default(),
         };
         tracker.relearn();
@@ -179,56 +204,133 @@ impl<'a> Tracker<'a> {
     /// Takes one line.
     #[inline]
     pub fn push(&mut self, line: &Line<'_>) -> Outcome {
-        let outcome = match line.pixels {
+        match line.pixels {
             Pixels::U8(p) => self.push_u8(line, p),
             Pixels::U16(p) => self.push_u16(line, p),
-        };
-        self.counts.add(&outcome);
-        outcome
+        }
+    }
+
+    /// Takes one line and passes what it measures on to `binner`: a group of rows that is complete. As
+    /// [`Tracker::push`] and [`Binner::push`] one after the other, in fewer instructions.
+    #[inline]
+    pub fn push_into(&mut self, line: &Line<'_>, binner: &mut Binner) -> Option<Sample> {
+        match line.pixels {
+            Pixels::U8(p) => self.push_u8_into(line, p, binner),
+            Pixels::U16(p) => self.push_u16_into(line, p, binner),
+        }
     }
 
     // Not inlined and not generic: compiled here, as this crate is, and what a firmware never pushes is left out.
+    #[inline(never)]
     fn push_u8(&mut self, line: &Line<'_>, pixels: &[u8]) -> Outcome {
         self.push_pixels(line, pixels)
     }
 
+    #[inline(never)]
     fn push_u16(&mut self, line: &Line<'_>, pixels: &[u16]) -> Outcome {
         self.push_pixels(line, pixels)
     }
 
-    #[inline]
+    #[inline(never)]
+    fn push_u8_into(&mut self, line: &Line<'_>, p: &[u8], binner: &mut Binner) -> Option<Sample> {
+        match self.push_pixels(line, p) {
+            Outcome::Measured(displacement) => binner.push_sound(displacement),
+            _ => None,
+        }
+    }
+
+    #[inline(never)]
+    fn push_u16_into(&mut self, line: &Line<'_>, p: &[u16], binner: &mut Binner) -> Option<Sample> {
+        match self.push_pixels(line, p) {
+            Outcome::Measured(displacement) => binner.push_sound(displacement),
+            _ => None,
+        }
+    }
+
+    /// What every line takes, in a straight line; what only some take is called.
+    #[inline(always)]
     fn push_pixels<P: Pixel>(&mut self, line: &Line<'_>, pixels: &[P]) -> Outcome {
         let row = usize::from(line.row);
         if line.row >= self.config.rows || pixels.len() != usize::from(self.config.width) {
+            self.counts.misfit = self.counts.misfit.wrapping_add(1);
             return Outcome::Misfit;
         }
         if self.frame != Some(line.frame) {
             self.next_frame(line.frame, line.start_ns);
         }
         if self.stage != Stage::Tracking {
-            self.learn(row, pixels);
+            self.locate_and_learn(row, pixels);
             return Outcome::Learning;
         }
-        self.follow_one_step(row);
-        match self.locate(row, pixels) {
-            Found::NoTexture => Outcome::NoTexture,
-            Found::Disturbed => Outcome::Disturbed,
+        let mut aside_px = 0.0;
+        if self.beside {
+            aside_px = self.work_beside::<P>(row);
+        }
+        match self.locate(row, pixels, aside_px) {
+            Found::NoTexture => {
+                self.counts.no_texture = self.counts.no_texture.wrapping_add(1);
+                Outcome::NoTexture
+            }
+            Found::Disturbed => {
+                self.counts.disturbed = self.counts.disturbed.wrapping_add(1);
+                Outcome::Disturbed
+            }
             Found::At {
                 shift_px,
                 information_per_px2,
-            } => Outcome::Measured(Displacement {
-                frame: line.frame,
-                row: line.row,
-                time_ns: line
-                    .start_ns
-                    .saturating_add(i64::from(self.config.timing.exposure_ns() / 2))
-                    .saturating_add(self.flicker.delay_ns(self.ns_per_slope)),
-                shift_px: shift_px + self.follow.anchor_px(),
-                information_per_px2,
-            }),
+            } => {
+                self.counts.measured = self.counts.measured.wrapping_add(1);
+                Outcome::Measured(Displacement {
+                    frame: line.frame,
+                    row: line.row,
+                    time_ns: line.start_ns.wrapping_add(self.middle_ns()),
+                    shift_px: shift_px + self.follow.anchor_px(),
+                    information_per_px2,
+                })
+            }
         }
     }
 
+    #[cold]
+    #[inline(never)]
+    fn locate_and_learn<P: Pixel>(&mut self, row: usize, pixels: &[P]) {
+        self.counts.learning = self.counts.learning.wrapping_add(1);
+        let found = self.locate(row, pixels, 0.0);
+        self.learn(row, pixels, found);
+    }
+
+    /// What a line may need is bounded: not while learning, which cannot be done in a line time.
+    fn is_hurried(&self) -> bool {
+        self.stage == Stage::Tracking && self.config.columns_per_line != u16::MAX
+    }
+
+    /// What is done beside a line, when there is something. Returns by how much the row's reference lies to
+    /// the left of the others', px.
+    #[cold]
+    #[inline(never)]
+    fn work_beside<P: Pixel>(&mut self, row: usize) -> f32 {
+        // A line that will be looked at has enough to do, and so has a frame's first.
+        let idle = row < self.attend && !self.flicker.is_fresh();
+        let aside_px = if idle || self.follow.is_moving() || !self.is_hurried() {
+            self.follow_one_step::<P>(row)
+        } else {
+            0.0
+        };
+        if let Some(start_px) = self.start_px() {
+            self.prediction.suppose(start_px);
+        }
+        self.beside = self.follow.is_busy() || self.watch.is_searching();
+        aside_px
+    }
+
+    /// From the start of a line's exposure to its mean time, ns.
+    #[inline(always)]
+    fn middle_ns(&self) -> i64 {
+        let half = (self.config.timing.exposure_ns() / 2) as i32;
+        i64::from(half.saturating_add(self.flicker.delay_ns(self.ns_per_slope)))
+    }
+
+    #[cold]
     fn next_frame(&mut self, frame: u32, start_ns: i64) {
         if self.stage == Stage::Tracking {
             if self.watch.end_frame(start_ns) {
@@ -246,75 +348,169 @@ impl<'a> Tracker<'a> {
         self.prediction
             .begin_frame(start_ns, self.stage != Stage::Rough);
         self.watch.begin_frame(frame);
+        // The first line has the frame's own work beside it.
+        self.attend = usize::from(self.is_hurried());
+        self.beside = self.follow.is_busy() || self.watch.is_searching();
         self.flicker.begin_frame();
     }
 
-    /// Shift of a line against its reference, in the reference's own coordinates.
-    #[inline]
-    fn locate<P: Pixel>(&mut self, row: usize, pixels: &[P]) -> Found {
+    /// Shift of a line against the reference, whose row lies `aside_px` to the left of the others.
+    #[inline(always)]
+    fn locate<P: Pixel>(&mut self, row: usize, pixels: &[P], aside_px: f32) -> Found {
         let Some(&table) = self.storage.tables.get(row) else {
             return Found::NoTexture;
         };
-        let information_per_px2 = table.information_per_px2();
-        if information_per_px2 == 0.0 {
+        if !table.has_texture() {
             return Found::NoTexture;
         }
-        let expected = self.prediction.at(row);
+        let information_per_px2 = table.information_per_px2();
+        let expected = self.prediction.at(row) + aside_px;
         let before = self.to_reference;
-        let Some(mut shift_px) = self.correlate(row, &table, pixels, expected) else {
-            return Found::NoTexture;
+        let mut shift_px = match self.correlate(row, &table, pixels, expected) {
+            Ok(shift_px) => shift_px,
+            Err(Unfound::NoNumber) => return Found::NoTexture,
+            Err(Unfound::Unfinished(shift_px)) => {
+                self.leave(shift_px - aside_px);
+                return Found::Disturbed;
+            }
         };
         let surprise = shift_px - expected;
-        let turn = self.turn == row;
-        let due = turn
-            || self.watch.is_due(row)
+        // How much brighter than the line before it, against their references.
+        let mut brighter = before / self.to_reference - 1.0;
+        let due = row >= self.attend
             || surprise * surprise * information_per_px2 > 49.0 + information_per_px2
-            || (self.to_reference - before).abs() > 0.05 * before;
+            || brighter.abs() > STEEPEST;
+        let mut jumped = false;
         if due {
-            match self.look(row, &table, pixels, shift_px) {
-                Some(looked) => shift_px = looked,
-                None => return Found::Disturbed,
-            }
-            if turn {
-                self.follow_row(row, pixels, shift_px);
-            }
+            let Some(looked) = self.look_and_follow(row, &table, pixels, expected, shift_px) else {
+                return Found::Disturbed;
+            };
+            shift_px = looked;
+            jumped = (shift_px - expected).abs() > JUMP_PX;
+            brighter = before / self.to_reference - 1.0;
         }
-        if self.prediction.is_swift() {
+        if self.prediction.is_swift() && aside_px == 0.0 {
             shift_px = self.unsmear(row, &table, pixels, shift_px);
         }
-        if due && (shift_px - expected).abs() > JUMP_PX {
+        shift_px -= aside_px;
+        if jumped {
             self.prediction.jump(row, shift_px, information_per_px2);
         } else {
             self.prediction.add(row, shift_px, information_per_px2);
         }
-        self.flicker.add(self.to_reference);
+        self.flicker.add(brighter);
         Found::At {
             shift_px,
             information_per_px2,
         }
     }
 
+    /// What becomes of a line that is looked at; its shift, unless it is disturbed.
+    #[cold]
+    fn look_and_follow<P: Pixel>(
+        &mut self,
+        row: usize,
+        table: &RowTable,
+        pixels: &[P],
+        expected_px: f32,
+        shift_px: f32,
+    ) -> Option<f32> {
+        if self.prediction.needs_more_than(table.information_per_px2()) {
+            return None;
+        }
+        if self.flicker.is_fresh() && self.is_hurried() {
+            // The frame's first line has the frame's own work beside it: the next one is looked at.
+            if (shift_px - expected_px).abs() <= JUMP_PX {
+                return Some(shift_px);
+            }
+            self.leave(shift_px);
+            return None;
+        }
+        let looked = self.look(row, table, pixels, shift_px);
+        if let Some(shift_px) = looked
+            && self.turn == row
+        {
+            self.follow_row(row, pixels, shift_px);
+        }
+        self.attend = self.watch.next_due(row);
+        if self.turn > row {
+            self.attend = self.attend.min(self.turn);
+        }
+        self.beside = self.follow.is_busy() || self.watch.is_searching();
+        looked
+    }
+
     /// The phase-correlation peak of a line near `expected_px`: one inner product where the motion is
-    /// small or was foreseen, a few where not. `None` for a result that is no number.
-    #[inline]
+    /// small.
+    #[inline(always)]
     fn correlate<P: Pixel>(
         &mut self,
         row: usize,
         table: &RowTable,
         pixels: &[P],
         expected_px: f32,
-    ) -> Option<f32> {
+    ) -> Result<f32, Unfound> {
+        // The common case: less than half a step from the reference, the whole line meets the whole row.
+        if expected_px.abs() < self.half_step_px {
+            let Some(coefficients) = part(self.storage.coefficients, row, pixels.len()) else {
+                return Err(Unfound::NoNumber);
+            };
+            let (product, sum) = P::sums(self.config.kernel, pixels, coefficients);
+            // A black line has no brightness to divide by, and no texture to measure.
+            self.to_reference = at_least_1(table.pixel_sum()) / at_least_1(sum);
+            let near = table.shift_px(product * self.to_reference);
+            if near.abs() <= self.near_px {
+                return Ok(near);
+            }
+            return self.correlate_far(row, table, pixels, near.clamp(-4.0, 4.0), 1);
+        }
+        self.correlate_far(row, table, pixels, expected_px, 0)
+    }
+
+    /// [`Tracker::correlate`] where the picture has moved by whole pixels: one inner product where that was
+    /// foreseen, a few where not. `done`: how many were taken before.
+    #[inline(never)]
+    fn correlate_far<P: Pixel>(
+        &mut self,
+        row: usize,
+        table: &RowTable,
+        pixels: &[P],
+        expected_px: f32,
+        done: u8,
+    ) -> Result<f32, Unfound> {
+        let hurried = self.is_hurried();
+        let turns = if hurried { TURNS_IN_A_HURRY } else { TURNS };
+        let far = self.converge(row, table, pixels, expected_px, turns - done);
+        match far {
+            Some((shift_px, true)) => Ok(shift_px),
+            Some((shift_px, false)) if hurried => Err(Unfound::Unfinished(shift_px)),
+            Some((shift_px, false)) => Ok(shift_px),
+            None => Err(Unfound::NoNumber),
+        }
+    }
+
+    /// The shift after so many inner products, and whether one more would not change it.
+    #[inline(always)]
+    fn converge<P: Pixel>(
+        &mut self,
+        row: usize,
+        table: &RowTable,
+        pixels: &[P],
+        expected_px: f32,
+        turns: u8,
+    ) -> Option<(f32, bool)> {
         let width = pixels.len();
-        let coefficients = self.storage.coefficients.get(row * width..)?.get(..width)?;
-        let mean = self.storage.mean.get(row * width..)?.get(..width)?;
+        let coefficients = part(self.storage.coefficients, row, width)?;
+        let mean = part(self.storage.mean, row, width)?;
         let stride = i32::from(self.config.stride);
         let limit = width as i32 / 2;
         let steps = |px: f32| nearest_step(px, stride);
         let mut whole = steps(expected_px).clamp(-limit, limit);
         let mut shift_px = f32::NAN;
-        for _ in 0..6 {
+        let mut converged = false;
+        for _ in 0..turns {
             let overlap = Overlap::new(width, whole)?;
-            let sums = P::sums(
+            let (product, sum) = P::sums(
                 self.config.kernel,
                 pixels.get(overlap.line)?,
                 coefficients.get(overlap.reference)?,
@@ -325,18 +521,30 @@ impl<'a> Tracker<'a> {
                 .map(|&c| u32::from(c))
                 .sum();
             let seen = table.pixel_sum() - unseen as f32 / self.recipe.counts_per_value;
-            // A black line has no brightness to divide by, and no texture to measure.
-            self.to_reference = seen.max(1.0) / (sums.pixels as f32).max(1.0);
-            let near = table.shift_px(sums.product as f32 * self.to_reference);
+            self.to_reference = at_least_1(seen) / at_least_1(sum);
+            let near = table.shift_px(product * self.to_reference);
             shift_px = whole as f32 + near;
             let next = (whole + steps(near.clamp(-4.0, 4.0))).clamp(-limit, limit);
-            if near.abs() <= NEAR_PX * stride as f32 || next == whole {
+            converged = near.abs() <= self.near_px || next == whole;
+            if converged {
                 break;
             }
             whole = next;
         }
-        shift_px.is_finite().then_some(shift_px)
+        shift_px.is_finite().then_some((shift_px, converged))
     }
+}
+
+/// A row of a buffer that holds one row after the other.
+#[inline(always)]
+fn part<T>(buffer: &[T], row: usize, width: usize) -> Option<&[T]> {
+    buffer.get(row * width..)?.get(..width)
+}
+
+/// 1 for NaN; `f32::max` takes a microcontroller twice as long.
+#[inline(always)]
+fn at_least_1(v: f32) -> f32 {
+    if v > 1.0 { v } else { 1.0 }
 }
 
 /// See [`flicker`].

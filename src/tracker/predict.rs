@@ -43,7 +43,7 @@ impl Prediction {
     const ROWS: u16 = 4;
 
     /// Shift expected for this row, px.
-    #[inline]
+    #[inline(always)]
     pub(super) fn at(&self, row: usize) -> f32 {
         if self.swift_frames == 0 {
             return self.shift_px;
@@ -86,8 +86,23 @@ impl Prediction {
     }
 
     /// Takes what a row came to.
-    #[inline]
+    #[inline(always)]
     pub(super) fn add(&mut self, row: usize, shift_px: f32, information: f32) {
+        let surprise = shift_px - self.shift_px;
+        let square = surprise * surprise;
+        if self.swift_frames != 0 || square > Self::SWIFT_PX2 || self.gap.is_open() {
+            self.add_swift(row, shift_px, information);
+        } else {
+            // The common case of the below, in a straight line.
+            self.information = self.information * Self::KEEP + information;
+            self.shift_px += surprise * (information / self.information);
+            self.last_px = [shift_px, self.last_px[0]];
+            self.row = row as u16;
+        }
+    }
+
+    #[inline(never)]
+    fn add_swift(&mut self, row: usize, shift_px: f32, information: f32) {
         let expected = self.at(row);
         let surprise = shift_px - expected;
         let square = surprise * surprise;
@@ -127,6 +142,12 @@ impl Prediction {
     pub(super) fn jump(&mut self, row: usize, shift_px: f32, information: f32) {
         self.forget();
         self.add(row, shift_px, information);
+        self.shift_px = shift_px;
+    }
+
+    /// The picture may be here as well as anywhere: nothing else is known.
+    pub(super) fn suppose(&mut self, shift_px: f32) {
+        self.forget();
         self.shift_px = shift_px;
     }
 

@@ -10,13 +10,14 @@ use super::{
     Stage, Tracker,
     overlap::{Overlap, nearest_step},
 };
-use crate::{pixel::Pixel, reference::RowTable};
+use crate::{noise::LEAST_VARIANCE, pixel::Pixel, reference::RowTable};
 
 /// In tracking one row in this many is looked at even if it does not surprise.
 const EVERY: usize = 32;
 
-/// Columns that are looked at, about.
+/// Columns that are looked at, about; where a line time is short, so many for each that is built beside it.
 const COLUMNS: usize = 48;
+const COLUMNS_A_COLUMN: usize = 3;
 
 /// A search begins anew every so many pixels of one colour: where correlation converges from on a sharp
 /// texture too.
@@ -37,6 +38,8 @@ pub(super) struct Watch {
     turn: usize,
     /// Lines to wait before the next search, while nothing fits.
     rest: u8,
+    /// While nothing fits and a line has no time for a whole search: so many lines were looked for since.
+    start: Option<u16>,
     /// Lines of this frame that fitted, and that did not.
     fitted: u32,
     unfit: u32,
@@ -48,9 +51,19 @@ pub(super) struct Watch {
 }
 
 impl Watch {
-    #[inline]
-    pub(super) fn is_due(&self, row: usize) -> bool {
-        self.every_line || row % EVERY == self.turn
+    /// A line is looked for, one start a line.
+    #[inline(always)]
+    pub(super) fn is_searching(&self) -> bool {
+        self.start.is_some()
+    }
+
+    /// The next row to be looked at after `row`.
+    pub(super) fn next_due(&self, row: usize) -> usize {
+        if self.every_line {
+            return 0;
+        }
+        let next = row + 1;
+        next + (self.turn + EVERY - next % EVERY) % EVERY
     }
 
     pub(super) fn begin_frame(&mut self, frame: u32) {
@@ -85,6 +98,13 @@ pub(super) struct Rest {
     slope_power: f32,
 }
 
+impl Rest {
+    /// What noise does not explain, as the square of an error of the shift, px².
+    fn left_px2(&self) -> f32 {
+        (self.power - 2.0).max(0.0) / self.slope_power.max(1e-9)
+    }
+}
+
 impl Tracker<'_> {
     /// Looks whether a line at `shift_px` resembles its reference. Returns its shift, found anew if need
     /// be, or `None` for a disturbed line.
@@ -96,27 +116,50 @@ impl Tracker<'_> {
         pixels: &[P],
         shift_px: f32,
     ) -> Option<f32> {
-        if self.prediction.needs_more_than(table.information_per_px2()) {
-            return None;
+        if self.is_hurried() {
+            let fits = self.fits(row, pixels, shift_px);
+            self.note_fit(fits);
+            return fits.then_some(shift_px);
         }
         let mut fit = self.fits(row, pixels, shift_px).then_some(shift_px);
         if fit.is_none() && self.watch.rest == 0 {
             self.watch.rest = 8;
             fit = self
                 .search(row, table, pixels)
-                .and_then(|near| self.correlate(row, table, pixels, near))
+                .and_then(|near| self.correlate(row, table, pixels, near).ok())
                 .filter(|&shift| self.fits(row, pixels, shift));
         }
         self.watch.rest = self.watch.rest.saturating_sub(1);
-        self.watch.every_line = fit.is_none();
-        if fit.is_some() {
+        self.note_fit(fit.is_some());
+        fit
+    }
+
+    /// Remembers whether a line that was looked at fitted.
+    fn note_fit(&mut self, fits: bool) {
+        self.watch.every_line = !fits;
+        if fits {
             self.watch.fitted += 1;
+            self.watch.start = None;
         } else {
             // The brightness is that of something else.
             self.to_reference = 1.0;
             self.watch.unfit += 1;
+            if self.is_hurried() {
+                self.watch.start = Some(self.watch.start.map_or(0, |s| s.wrapping_add(1)));
+            }
         }
-        fit
+    }
+
+    /// Where a line has no time to be correlated to the end: it is as good as disturbed, the next one is
+    /// expected where it seemed to be.
+    #[cold]
+    pub(super) fn leave(&mut self, shift_px: f32) {
+        if !self.watch.is_searching() {
+            self.prediction.suppose(shift_px);
+        }
+        self.note_fit(false);
+        self.attend = 0;
+        self.beside = true;
     }
 
     fn fits<P: Pixel>(&mut self, row: usize, pixels: &[P], shift_px: f32) -> bool {
@@ -128,7 +171,10 @@ impl Tracker<'_> {
             Stage::Tracking => 0.2 + 4.0 * self.watch.usual_px2,
             Stage::Rough | Stage::Refining => 2.0,
         };
-        let fits = rest.power <= 5.0 + allowed_px2 * rest.slope_power;
+        let mut fits = rest.power <= 5.0 + allowed_px2 * rest.slope_power;
+        if fits && self.is_strict() {
+            fits = rest.left_px2() < self.well_px2();
+        }
         if fits && self.stage == Stage::Refining && rest.slope_power > 0.0 {
             self.watch
                 .learn((rest.power - 2.0).max(0.0) / rest.slope_power);
@@ -141,7 +187,6 @@ impl Tracker<'_> {
         let width = pixels.len();
         let r = &self.recipe;
         let mean = self.storage.mean.get(row * width..)?.get(..width)?;
-        let frames = f32::from(self.storage.learning.get(row)?.frames.max(1));
         let stride = r.stride as i32;
         let whole = nearest_step(shift_px, stride);
         let near = shift_px - whole as f32;
@@ -151,43 +196,82 @@ impl Tracker<'_> {
             self.storage.mask.get(overlap.reference)?,
         );
         let line = pixels.get(overlap.line)?;
-        let (value, pitch) = (1.0 / r.counts_per_value, 1.0 / r.stride as f32);
-        let own = 1.0 + 1.0 / frames;
-        let gain = 1.0 / self.to_reference;
-        let (mut power, mut slopes, mut n) = (0.0f32, 0.0f32, 0.0f32);
+        let columns = match self.config.columns_per_line {
+            u16::MAX => COLUMNS,
+            few => (COLUMNS_A_COLUMN * usize::from(few)).clamp(12, COLUMNS),
+        };
         // What the motion carries in and out at the ends is little known.
-        let inner = mean.len().checked_sub(2 * r.margin_px + 2 * r.stride)?;
-        for ((window, &p), &mask) in mean
-            .get(r.margin_px..)?
-            .windows(2 * r.stride + 1)
-            .zip(line.get(r.margin_px + r.stride..)?)
-            .zip(mask.get(r.margin_px + r.stride..)?)
-            .take(inner)
-            .step_by((width / COLUMNS).max(1))
-        {
-            let (Some(&left), Some(&here), Some(&right)) =
-                (window.first(), window.get(r.stride), window.last())
-            else {
-                continue;
+        let from = r.margin_px + r.stride;
+        let to = mean.len().checked_sub(from)?;
+        let step = (width / columns).max(1);
+        // All in counts of the reference.
+        let value = 1.0 / r.counts_per_value;
+        let gain = value / self.to_reference;
+        let near = near / r.stride as f32;
+        let saturation = r.saturation * r.counts_per_value;
+        let per_count = r.noise.per_value * value;
+        let (mut power, mut slopes, mut n) = (0.0f32, 0.0f32, 0u16);
+        for x in (from..to).step_by(step) {
+            let (Some(&left), Some(&here), Some(&right), Some(&p), Some(&mask)) = (
+                mean.get(x - r.stride),
+                mean.get(x),
+                mean.get(x + r.stride),
+                line.get(x),
+                mask.get(x),
+            ) else {
+                break;
             };
-            let here = f32::from(here) * value;
-            if mask == 0 || here >= r.saturation {
+            let (left, here, right) = (f32::from(left), f32::from(here), f32::from(right));
+            if mask == 0 || here >= saturation {
                 continue;
             }
-            let (left, right) = (f32::from(left) * value, f32::from(right) * value);
-            let slope = 0.5 * (right - left) * pitch;
-            let bend = (right - 2.0 * here + left) * pitch * pitch;
-            let model = here - near * (slope - 0.5 * near * bend);
+            let slope = right - left;
+            let bend = right + left - 2.0 * here;
+            let model = here - 0.5 * near * (slope - near * bend);
             let rest = f32::from(p.value()) - gain * model;
-            let weight = 1.0 / (r.noise.variance(here) * own);
+            let variance = r.noise.dark + per_count * here;
+            let weight = 1.0
+                / if variance > LEAST_VARIANCE {
+                    variance
+                } else {
+                    LEAST_VARIANCE
+                };
             power += rest * rest * weight;
             slopes += slope * slope * weight;
-            n += 1.0;
+            n += 1;
         }
-        (n >= 4.0).then(|| Rest {
-            power: power / n,
-            slope_power: slopes / n,
+        let frames = f32::from(self.storage.learning.get(row)?.frames());
+        let own = 1.0 / (f32::from(n) * (1.0 + 1.0 / frames));
+        let slope_px = 0.5 * value / r.stride as f32;
+        (n >= 4).then_some(Rest {
+            power: power * own,
+            slope_power: slopes * own * slope_px * slope_px,
         })
+    }
+
+    /// Starts of a search: so many either way, and the middle.
+    fn starts(&self) -> u16 {
+        let reach = self.config.search_px.min(self.config.width / 3);
+        2 * (reach / (START_STEPS as u16 * u16::from(self.config.stride))) + 1
+    }
+
+    /// A search goes the first time round: only a place that leaves next to nothing over will do.
+    fn is_strict(&self) -> bool {
+        matches!(self.watch.start, Some(start) if start > 0 && start <= self.starts())
+    }
+
+    /// A line that leaves no more over is found for certain, px².
+    fn well_px2(&self) -> f32 {
+        WELL_PX2 + 2.0 * self.watch.usual_px2
+    }
+
+    /// Where the next line is looked for while nothing fits, px: outwards from the usual place as by
+    /// [`Tracker::search`], one start a line. `None` where it is expected as ever.
+    pub(super) fn start_px(&self) -> Option<f32> {
+        let start = self.watch.start?.checked_sub(1)? % self.starts();
+        let away = i32::from(start.div_ceil(2)) * START_STEPS * i32::from(self.config.stride);
+        let away = if start % 2 == 0 { away } else { -away };
+        Some(self.prediction.usual_px() + away as f32)
     }
 
     /// Where a lost line resembles its reference, px: outwards from where the picture is most of the time,
@@ -201,18 +285,18 @@ impl Tracker<'_> {
         };
         let reach = i32::from(self.config.search_px).min(pixels.len() as i32 / 3);
         let step = START_STEPS * i32::from(self.config.stride);
-        let well_px2 = WELL_PX2 + 2.0 * self.watch.usual_px2;
+        let well_px2 = self.well_px2();
         let mut best: Option<(f32, f32)> = None;
         for start in (0..=reach).step_by(step as usize) {
             for start in [start, -start] {
                 let start_px = middle_px + start as f32;
-                let Some(shift_px) = self.correlate(row, table, pixels, start_px) else {
+                let Ok(shift_px) = self.correlate(row, table, pixels, start_px) else {
                     continue;
                 };
                 let Some(rest) = self.rest(row, pixels, shift_px) else {
                     continue;
                 };
-                let left_px2 = (rest.power - 2.0).max(0.0) / rest.slope_power.max(1e-9);
+                let left_px2 = rest.left_px2();
                 if left_px2 < well_px2 {
                     return Some(shift_px);
                 }

@@ -5,7 +5,7 @@ use crate::board::{
     host, stack,
     uart::Uart,
 };
-use crate::lines::{ClipError, Lines, MAX_WIDTH};
+use crate::lines::{ClipError, Lines, MAX_WIDTH, Pixels8};
 use core::fmt::{self, Write};
 use cortex_m_rt::entry;
 use rowtone::analyzer::Analyzer;
@@ -13,7 +13,7 @@ use rowtone::camera::{Timing, TimingError};
 use rowtone::report::Report;
 use rowtone::spectrum;
 use rowtone::timeline::{Binner, BinnerError, Group, Sample};
-use rowtone::tracker::{self, Outcome, Tracker};
+use rowtone::tracker::{self, Tracker};
 use rowtone::wire::{Message, text};
 use rowtone_mps2_an505::args::Args;
 use rowtone_mps2_an505::figures::Count;
@@ -104,13 +104,14 @@ impl Board<'_> {
     /// Both rounds over the same first frames. A board with a camera has no memory to see frames twice:
     /// it takes the frames as they come for both.
     fn learn(&mut self) -> Result<(), Failure> {
-        let mut pixels = [0; MAX_WIDTH];
+        let mut pixels = Pixels8([0; MAX_WIDTH]);
         for _ in 0..2 {
             while let Some(line) = self.lines.next(&mut pixels, &self.timing)? {
                 if line.frame >= LEARN_FRAMES {
                     break;
                 }
-                self.tracker.push(&line);
+                // It gives nothing yet.
+                self.tracker.push_into(&line, &mut self.binner);
             }
             self.tracker.end_round();
             self.lines.rewind()?;
@@ -119,13 +120,10 @@ impl Board<'_> {
     }
 
     fn measure(&mut self) -> Result<(), Failure> {
-        let mut pixels = [0; MAX_WIDTH];
+        let mut pixels = Pixels8([0; MAX_WIDTH]);
         while let Some(line) = self.lines.next(&mut pixels, &self.timing)? {
             let start = self.counter.as_ref().map(Counter::start);
-            let sample = match self.tracker.push(&line) {
-                Outcome::Measured(displacement) => self.binner.push(displacement),
-                _ => None,
-            };
+            let sample = self.tracker.push_into(&line, &mut self.binner);
             if let (Some(counter), Some(start)) = (&self.counter, start) {
                 self.per_line.add(counter.instructions(start));
             }

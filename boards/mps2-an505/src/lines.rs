@@ -7,6 +7,10 @@ use rowtone_mps2_an505::y4m::{Clip, MAX_HEADER, Y4mError};
 /// Longest line that is read, px: the budget's picture is 320 x 240.
 pub(crate) const MAX_WIDTH: usize = 320;
 
+/// A line's pixels, at a whole word as the DMA of the RP2350 leaves them.
+#[repr(align(4))]
+pub(crate) struct Pixels8(pub(crate) [u8; MAX_WIDTH]);
+
 /// Reads a clip's lines in order.
 pub(crate) struct Lines {
     file: File,
@@ -94,7 +98,7 @@ impl Lines {
     /// The next line, its pixels in `pixels`; `None` at the end.
     pub(crate) fn next<'a>(
         &mut self,
-        pixels: &'a mut [u8; MAX_WIDTH],
+        pixels: &'a mut Pixels8,
         timing: &Timing,
     ) -> Result<Option<Line<'a>>, ClipError> {
         if self.frame >= self.frames {
@@ -108,7 +112,7 @@ impl Lines {
             }
         }
         let (frame, row) = (self.frame, self.row);
-        let pixels = &mut pixels[..usize::from(self.clip.width)];
+        let pixels = &mut pixels.0[..usize::from(self.clip.width)];
         self.file.read_exact(pixels)?;
         self.row += 1;
         if self.row == self.clip.rows {

@@ -30,7 +30,11 @@ pub fn rows_per_sample(timing: Timing, frames: u32) -> u16 {
 }
 
 /// Memory for pictures of up to `PIXELS` pixels, `ROWS` rows and `WIDTH` columns.
+///
+/// The coefficients come first and at a whole word: where the width is a multiple of four, every row of
+/// them lies so, and the inner product loads two words at once.
 #[derive(Debug)]
+#[repr(C, align(8))]
 pub struct TrackerMemory<const PIXELS: usize, const ROWS: usize, const WIDTH: usize> {
     coefficients: [i8; PIXELS],
     mean: [u16; PIXELS],
@@ -38,6 +42,7 @@ pub struct TrackerMemory<const PIXELS: usize, const ROWS: usize, const WIDTH: us
     learning: heapless::Vec<RowLearning, ROWS>,
     mask: [u8; WIDTH],
     columns: heapless::Vec<ColumnLearning, WIDTH>,
+    fresh: [i8; WIDTH],
     scratch: [[f32; 2]; WIDTH],
 }
 
@@ -53,6 +58,7 @@ impl<const PIXELS: usize, const ROWS: usize, const WIDTH: usize>
             learning: heapless::Vec::new(),
             mask: [0; WIDTH],
             columns: heapless::Vec::new(),
+            fresh: [0; WIDTH],
             scratch: [[0.0; 2]; WIDTH],
         }
     }
@@ -71,6 +77,7 @@ impl<const PIXELS: usize, const ROWS: usize, const WIDTH: usize>
             learning: &mut self.learning,
             mask: &mut self.mask,
             columns: &mut self.columns,
+            fresh: &mut self.fresh,
             scratch: self.scratch.as_flattened_mut(),
         }
     }

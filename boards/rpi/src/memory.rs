@@ -18,6 +18,7 @@ pub struct TrackerMemory {
     learning: Vec<RowLearning>,
     mask: Vec<u8>,
     columns: Vec<ColumnLearning>,
+    fresh: Vec<i8>,
     scratch: Vec<f32>,
 }
 
@@ -32,6 +33,7 @@ impl TrackerMemory {
             learning: vec![RowLearning::default(); rows],
             mask: vec![u8::MAX; width],
             columns: vec![ColumnLearning::default(); width],
+            fresh: vec![0; width],
             scratch: vec![0.0; 2 * width],
         }
     }
@@ -45,6 +47,7 @@ impl TrackerMemory {
             learning: &mut self.learning,
             mask: &mut self.mask,
             columns: &mut self.columns,
+            fresh: &mut self.fresh,
             scratch: &mut self.scratch,
         }
     }

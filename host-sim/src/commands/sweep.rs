@@ -45,6 +45,9 @@ struct Lines {
     /// A part of each picture, and fewer frames
     #[arg(long)]
     quick: bool,
+    /// As a microcontroller does it: everything beside a line in steps of so many columns
+    #[arg(long, value_name = "COLUMNS")]
+    in_steps_of: Option<u16>,
     /// Which series of recordings
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -150,7 +153,8 @@ fn lines(options: &Lines) -> Result<(), Failure> {
     let mut out = std::io::stdout().lock();
     let failed = |error| Failure::writing("standard output", &error);
     writeln!(out, "{}", line_table::head()).map_err(failed)?;
-    for case in cases {
+    for mut case in cases {
+        case.columns_per_line = options.in_steps_of;
         writeln!(out, "{}", line_table::row(&case)).map_err(failed)?;
     }
     Ok(())

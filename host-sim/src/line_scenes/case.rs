@@ -11,6 +11,8 @@ pub struct Case {
     pub config: Config,
     /// Frames in each of the two rounds of learning; none of them is measured.
     pub learn_frames: u16,
+    /// Columns a line that are built anew beside it; all that the tracker likes where there is none.
+    pub columns_per_line: Option<u16>,
     /// Frequency up to which peaks are looked for, Hz.
     pub max_hz: f32,
     /// Rows count from this time on, s.
@@ -70,6 +72,7 @@ pub fn small_motion(seed: u64, rows: u32, frames: u32) -> Vec<Case> {
                     ..Config::default()
                 },
                 learn_frames: 10,
+                columns_per_line: None,
                 max_hz: 1000.0,
                 measured_from_s: 0.0,
                 peaks: false,
@@ -96,6 +99,7 @@ fn usual(seed: u64, name: &str, tones: Vec<Tone>, seconds: f64) -> Case {
         name: name.to_owned(),
         config,
         learn_frames: 10,
+        columns_per_line: None,
         max_hz: 2500.0,
         measured_from_s: 0.0,
         peaks: true,

@@ -64,6 +64,7 @@ struct Memory {
     learning: Vec<rowtone::tracker::RowLearning>,
     mask: Vec<u8>,
     columns: Vec<rowtone::tracker::ColumnLearning>,
+    fresh: Vec<i8>,
     scratch: Vec<f32>,
 }
 
@@ -76,6 +77,7 @@ impl Memory {
             learning: vec![Default::default(); rows],
             mask: vec![u8::MAX; width],
             columns: vec![Default::default(); width],
+            fresh: vec![0; width],
             scratch: vec![0.0; 2 * width],
         }
     }
@@ -84,6 +86,7 @@ impl Memory {
         let config = Config {
             bits: case.config.sensor.bits,
             learn_frames: case.learn_frames,
+            columns_per_line: case.columns_per_line.unwrap_or(u16::MAX),
             ..Config::new(camera.timing(), self.mask.len() as u16)
         };
         let storage = Storage {
@@ -93,6 +96,7 @@ impl Memory {
             learning: &mut self.learning,
             mask: &mut self.mask,
             columns: &mut self.columns,
+            fresh: &mut self.fresh,
             scratch: &mut self.scratch,
         };
         Tracker::new(config, storage).map_err(CaseError::Tracker)

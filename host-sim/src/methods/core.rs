@@ -29,6 +29,7 @@ impl Method for Core {
         let mut learning = vec![Default::default(); clip.height];
         let mut mask = vec![u8::MAX; clip.width];
         let mut columns = vec![Default::default(); clip.width];
+        let mut fresh = vec![0; clip.width];
         let mut scratch = vec![0.0; 2 * clip.width];
         let storage = Storage {
             coefficients: &mut coefficients,
@@ -37,6 +38,7 @@ impl Method for Core {
             learning: &mut learning,
             mask: &mut mask,
             columns: &mut columns,
+            fresh: &mut fresh,
             scratch: &mut scratch,
         };
         let count = clip.frames.len();

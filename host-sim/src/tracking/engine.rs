@@ -18,6 +18,7 @@ pub struct Buffers {
     learning: Vec<rowtone::tracker::RowLearning>,
     mask: Vec<u8>,
     columns: Vec<rowtone::tracker::ColumnLearning>,
+    fresh: Vec<i8>,
     scratch: Vec<f32>,
 }
 
@@ -32,6 +33,7 @@ impl Buffers {
             learning: vec![Default::default(); part.height],
             mask: vec![u8::MAX; part.width],
             columns: vec![Default::default(); part.width],
+            fresh: vec![0; part.width],
             scratch: vec![0.0; 2 * part.width],
         }
     }
@@ -44,6 +46,7 @@ impl Buffers {
             learning: &mut self.learning,
             mask: &mut self.mask,
             columns: &mut self.columns,
+            fresh: &mut self.fresh,
             scratch: &mut self.scratch,
         }
     }
