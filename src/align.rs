@@ -33,7 +33,7 @@ impl Averaging {
             from: 0,
             to: width,
         };
-        if shift_px.abs() >= STILL_PX {
+        if shift_px.is_nan() || shift_px.abs() >= STILL_PX {
             let stride = recipe.stride as isize;
             let steps = shift_px / recipe.stride as f32;
             let whole = libm::floorf(steps);

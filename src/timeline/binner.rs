@@ -196,7 +196,8 @@ struct Open {
 impl Open {
     fn spread(&self, group: &Group) -> Spread {
         let line_ns = group.timing.line_time_ps() as f32 * 1e-3;
-        let [first, second, third] = self.moments.map(|m| m / self.information);
+        let per_information = 1.0 / self.information;
+        let [first, second, third] = self.moments.map(|m| m * per_information);
         let variance = (second - first * first).max(0.0) * line_ns * line_ns;
         let third = third - first * (3.0 * second - 2.0 * first * first);
         Spread {
@@ -239,6 +240,12 @@ impl Open {
 #[inline(never)]
 fn much_later_ns(time_ns: i64, first_ns: i64) -> f32 {
     time_ns.saturating_sub(first_ns) as f32
+}
+
+#[cold]
+#[inline(never)]
+fn rounded_ns(ns: f32) -> i64 {
+    libm::roundf(ns) as i64
 }
 
 /// A row of which something is known.
@@ -353,11 +360,17 @@ impl Binner {
             return None;
         }
         let shift_px = open.weighted_shift / open.information;
-        let later = libm::roundf(open.weighted_ns / open.information) as i64;
+        let later_ns = open.weighted_ns / open.information;
+        let later_ns = if later_ns.abs() < 1e9 {
+            // The nearest, as fast as a cast.
+            i64::from((later_ns + 0.5f32.copysign(later_ns)) as i32)
+        } else {
+            rounded_ns(later_ns)
+        };
         (shift_px.is_finite() && open.information.is_finite()).then_some(Sample {
             frame: open.frame,
             slot: open.slot,
-            time_ns: open.first_ns.saturating_add(later),
+            time_ns: open.first_ns.saturating_add(later_ns),
             shift_px,
             information_per_px2: open.information,
             spread: open.spread(&self.group),

@@ -29,11 +29,6 @@ impl Flicker {
         self.fresh = true;
     }
 
-    /// No row of this frame was taken yet.
-    pub(super) fn is_fresh(&self) -> bool {
-        self.fresh
-    }
-
     /// Takes how much brighter a row is than the one before it, as a share.
     #[inline(always)]
     pub(super) fn add(&mut self, brighter: f32) {

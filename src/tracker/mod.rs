@@ -309,8 +309,8 @@ impl<'a> Tracker<'a> {
     #[cold]
     #[inline(never)]
     fn work_beside<P: Pixel>(&mut self, row: usize) -> f32 {
-        // A line that will be looked at has enough to do, and so has a frame's first.
-        let idle = row < self.attend && !self.flicker.is_fresh();
+        // A line that will be looked at has enough to do.
+        let idle = row < self.attend;
         let aside_px = if idle || self.follow.is_moving() || !self.is_hurried() {
             self.follow_one_step::<P>(row)
         } else {
@@ -348,8 +348,7 @@ impl<'a> Tracker<'a> {
         self.prediction
             .begin_frame(start_ns, self.stage != Stage::Rough);
         self.watch.begin_frame(frame);
-        // The first line has the frame's own work beside it.
-        self.attend = usize::from(self.is_hurried());
+        self.attend = 0;
         self.beside = self.follow.is_busy() || self.watch.is_searching();
         self.flicker.begin_frame();
     }
@@ -382,7 +381,7 @@ impl<'a> Tracker<'a> {
             || brighter.abs() > STEEPEST;
         let mut jumped = false;
         if due {
-            let Some(looked) = self.look_and_follow(row, &table, pixels, expected, shift_px) else {
+            let Some(looked) = self.look_and_follow(row, &table, pixels, shift_px) else {
                 return Found::Disturbed;
             };
             shift_px = looked;
@@ -412,18 +411,9 @@ impl<'a> Tracker<'a> {
         row: usize,
         table: &RowTable,
         pixels: &[P],
-        expected_px: f32,
         shift_px: f32,
     ) -> Option<f32> {
         if self.prediction.needs_more_than(table.information_per_px2()) {
-            return None;
-        }
-        if self.flicker.is_fresh() && self.is_hurried() {
-            // The frame's first line has the frame's own work beside it: the next one is looked at.
-            if (shift_px - expected_px).abs() <= JUMP_PX {
-                return Some(shift_px);
-            }
-            self.leave(shift_px);
             return None;
         }
         let looked = self.look(row, table, pixels, shift_px);

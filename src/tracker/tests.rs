@@ -42,8 +42,18 @@ impl Memory {
     }
 
     fn tracker(&mut self, stride: u8) -> Tracker<'_> {
+        self.tracker_in_steps(stride, u16::MAX)
+    }
+
+    /// A tracker that does no more than a microcontroller can in one line time.
+    fn hurried(&mut self) -> Tracker<'_> {
+        self.tracker_in_steps(1, 4)
+    }
+
+    fn tracker_in_steps(&mut self, stride: u8, columns_per_line: u16) -> Tracker<'_> {
         let config = Config {
             stride,
+            columns_per_line,
             learn_frames: LEARN_FRAMES,
             ..Config::new(timing(), WIDTH as u16)
         };
@@ -317,5 +327,94 @@ fn a_shift_beyond_all_bounds_overflows_nothing() {
         assert!(tracker.storage.mean == &before[..]);
         let errors = errors(&camera.show(&mut tracker, still, |_, _| ()), still);
         assert!(errors.iter().all(|e| e.abs() < 0.1), "{errors:?}");
+    }
+}
+
+#[test]
+fn in_a_hurry_a_jump_is_found_within_three_frames() {
+    let (mut memory, mut camera) = (Memory::new(), Camera::new(surface));
+    let mut tracker = memory.hurried();
+    camera.teach(&mut tracker, still);
+    for to_px in [11.0, -23.0, 0.0] {
+        let at = move |_: f32| to_px;
+        for _ in 0..3 {
+            let outcomes = camera.show(&mut tracker, at, |_, _| ());
+            let wrong = |o: &&Outcome| matches!(o, Outcome::Measured(d) if (d.shift_px - to_px).abs() >= 1.0);
+            assert_eq!(outcomes.iter().find(wrong), None, "{to_px}");
+        }
+        let errors = errors(&camera.show(&mut tracker, at, |_, _| ()), at);
+        assert!(errors.iter().all(|e| e.abs() < 1.0), "{to_px}: {errors:?}");
+    }
+}
+
+#[test]
+fn in_a_hurry_a_hand_is_forgotten_within_three_frames() {
+    let (mut memory, mut camera) = (Memory::new(), Camera::new(surface));
+    let mut tracker = memory.hurried();
+    camera.teach(&mut tracker, still);
+    let hand = |_: u16, pixels: &mut [u8; WIDTH]| pixels[20..80].fill(90);
+    for _ in 0..20 {
+        let outcomes = camera.show(&mut tracker, still, hand);
+        // A frame's first line is not looked at, unless it surprises.
+        let measured = |o: &&Outcome| matches!(o, Outcome::Measured(_));
+        assert!(outcomes.iter().filter(measured).count() <= 1);
+    }
+    for _ in 0..3 {
+        camera.show(&mut tracker, still, |_, _| ());
+    }
+    let after = errors(&camera.show(&mut tracker, still, |_, _| ()), still);
+    assert!(after.iter().all(|e| e.abs() < 0.1), "{after:?}");
+    assert_eq!(tracker.counts().relearned, 0);
+}
+
+#[test]
+fn in_a_hurry_a_creeping_picture_is_followed_row_by_row() {
+    let (mut memory, mut camera) = (Memory::new(), Camera::new(surface));
+    let mut tracker = memory.hurried();
+    let creep = |t: f32| 0.5 * t;
+    camera.teach(&mut tracker, creep);
+    let first = errors(&camera.show(&mut tracker, creep, |_, _| ()), creep);
+    let mut built = tracker.storage.tables.to_vec();
+    let mut rebuilt = 0;
+    for _ in 0..500 {
+        // No frame is left out while the reference is moved.
+        let now = errors(&camera.show(&mut tracker, creep, |_, _| ()), creep);
+        for (a, b) in first.iter().zip(&now) {
+            assert!((a - b).abs() < 0.3, "{a} {b}");
+        }
+        rebuilt += (built.iter().zip(&*tracker.storage.tables))
+            .filter(|(a, b)| a != b)
+            .count();
+        built.copy_from_slice(tracker.storage.tables);
+    }
+    assert!(tracker.follow.anchor_px() >= 3.0);
+    assert!(rebuilt > 20, "{rebuilt} rows");
+}
+
+#[test]
+fn in_a_hurry_swift_motion_is_followed_row_by_row() {
+    for (hz, amplitude_px) in [(7.3, 4.0), (43.7, 4.0), (213.7, 4.0)] {
+        let (mut memory, mut camera) = (Memory::new(), Camera::new(surface));
+        let mut tracker = memory.hurried();
+        let swing = tone(hz, amplitude_px);
+        camera.teach(&mut tracker, &swing);
+        let (mut missing, mut worst) = (0, 0.0f32);
+        for _ in 0..30 {
+            for outcome in camera.show(&mut tracker, &swing, |_, _| ()) {
+                match outcome {
+                    Outcome::Measured(d) => {
+                        let error = d.shift_px - swing(d.time_ns as f32 * 1e-9);
+                        worst = worst.max(error.abs());
+                    }
+                    _ => missing += 1,
+                }
+            }
+        }
+        // Of 720 lines; a row's own offset, which is in the error, depends on where it was learned.
+        assert!(
+            missing < 36,
+            "{amplitude_px} px at {hz} Hz: {missing} lines missing"
+        );
+        assert!(worst < 1.0, "{amplitude_px} px at {hz} Hz: {worst} px");
     }
 }

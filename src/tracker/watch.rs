@@ -211,7 +211,8 @@ impl Tracker<'_> {
         let saturation = r.saturation * r.counts_per_value;
         let per_count = r.noise.per_value * value;
         let (mut power, mut slopes, mut n) = (0.0f32, 0.0f32, 0u16);
-        for x in (from..to).step_by(step) {
+        // Not at the very edge, which a reference that was moved does not know.
+        for x in (from + step / 2..to).step_by(step) {
             let (Some(&left), Some(&here), Some(&right), Some(&p), Some(&mask)) = (
                 mean.get(x - r.stride),
                 mean.get(x),
