@@ -76,7 +76,7 @@ mod tests {
         for first in 0..=u8::MAX {
             let pixels: [u8; 29] = core::array::from_fn(|x| first.wrapping_sub(x as u8));
             u8::pack(&pixels, &mut scratch);
-            let deep: [u16; 29] = core::array::from_fn(|x| u16::from(first) * 257 ^ x as u16);
+            let deep: [u16; 29] = core::array::from_fn(|x| (u16::from(first) * 257) ^ x as u16);
             assert!((0..29).all(|x| u8::unpack(&scratch, x) == u16::from(pixels[x])));
             u16::pack(&deep, &mut scratch);
             assert!((0..29).all(|x| u16::unpack(&scratch, x) == deep[x]));

@@ -271,7 +271,7 @@ impl Tracker<'_> {
     pub(super) fn start_px(&self) -> Option<f32> {
         let start = self.watch.start?.checked_sub(1)? % self.starts();
         let away = i32::from(start.div_ceil(2)) * START_STEPS * i32::from(self.config.stride);
-        let away = if start % 2 == 0 { away } else { -away };
+        let away = if start.is_multiple_of(2) { away } else { -away };
         Some(self.prediction.usual_px() + away as f32)
     }
 
