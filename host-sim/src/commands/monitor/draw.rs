@@ -167,6 +167,7 @@ fn waterfall(history: &History, area: Rect) -> Paragraph<'static> {
     for (row, report) in history.reports.iter().take(rows).enumerate() {
         let ago_s = newest_ms.saturating_sub(report.time_ms) as f64 / 1000.0;
         let time = match row % 5 {
+            _ if row == 0 => format!("{:>1$} ", "now", TIMES - 1),
             0 => format!("{:>1$.1} ", -ago_s, TIMES - 1),
             _ => " ".repeat(TIMES),
         };

@@ -57,11 +57,13 @@ impl History {
         );
         let middle = f32::midpoint(low, high);
         let half = ((high - low) / 2.0).max(0.1 * middle);
+        // What is quiet stands in the middle of a step, not between two.
+        let centre = if half > (high - low) / 2.0 { 3.5 } else { 4.0 };
         shown
             .clone()
             .map(|amplitude| match amplitude {
                 Some(amplitude) if half > 0.0 => {
-                    let step = 4.0 + 4.0 * (amplitude - middle) / half;
+                    let step = centre + 4.0 * (amplitude - middle) / half;
                     BARS[(step as usize).min(7)]
                 }
                 _ => ' ',
@@ -111,7 +113,7 @@ mod tests {
             history.push(&report);
         }
         let trend = history.trend(1, 8);
-        assert!(trend.chars().all(|bar| "▄▅".contains(bar)), "{trend}");
+        assert_eq!(trend, "▄▄▄▄▄▄▄▄");
         report.peaks.clear();
         for _ in 0..TREND {
             history.push(&report);
