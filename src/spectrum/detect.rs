@@ -18,6 +18,9 @@ pub(crate) const CANDIDATES: usize = 4;
 /// beside the multiple of the frame rate that hides it.
 const LEAST_KEPT: f32 = 0.03;
 
+/// Nearer than this many 1/T to a multiple of the frame rate, what the projection leaves is looked at.
+const NEAR_MULTIPLE: f32 = 1.2;
+
 /// Where a tone may be.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Candidate {
@@ -93,11 +96,31 @@ pub(crate) fn candidates(
     let first = (libm::ceilf(band.lowest_hz / bin_hz) as usize).max(2);
     let last = ((band.highest_hz / bin_hz) as usize).min(bins.len().saturating_sub(2));
     let scale = 2.0 / samples.total_weight;
+    if first > last {
+        return found;
+    }
+    let (mut here, mut after) = (bins[first - 1].norm_sqr(), bins[first].norm_sqr());
+    // No peak lower than this can be a candidate any more: the kernel only falls with frequency, and a parabola's
+    // vertex is at most an eighth above its highest point.
+    let mut too_low = 0.0;
+    let most = 1.125 * scale / g.kernel(last as f32 * bin_hz);
+    let near_bins = band.fps.map(|fps| {
+        let reach = NEAR_MULTIPLE / samples.length_s + bin_hz;
+        (bin_hz / fps, reach / fps)
+    });
     for b in first..=last {
-        let here = bins[b].norm_sqr();
-        let (before, after) = (bins[b - 1].norm_sqr(), bins[b + 1].norm_sqr());
+        let before = here;
+        here = after;
+        after = bins[b + 1].norm_sqr();
         // Written so that a NaN is no peak.
         if !(here > before && here >= after) {
+            continue;
+        }
+        let may_be_near = near_bins.is_some_and(|(turns, reach)| {
+            let at = b as f32 * turns;
+            (at - (at + 0.5) as i32 as f32).abs() < reach
+        });
+        if here < too_low * if may_be_near { LEAST_KEPT } else { 1.0 } {
             continue;
         }
         let (shift, height) = parabola(before, here, after);
@@ -106,7 +129,7 @@ pub(crate) fn candidates(
         let least = found.last().map_or(0.0, |c: &Candidate| c.gain);
         let near = band.fps.is_some_and(|fps| {
             let away = hz - fps * libm::roundf(hz / fps);
-            away.abs() * samples.length_s < 1.2
+            away.abs() * samples.length_s < NEAR_MULTIPLE
         });
         if near {
             if found.is_full() && gain < least * LEAST_KEPT {
@@ -123,6 +146,9 @@ pub(crate) fn candidates(
             gain,
         };
         insert(&mut found, candidate);
+        if found.is_full() {
+            too_low = found.last().map_or(0.0, |c| c.gain / most);
+        }
     }
     found
 }

@@ -3,12 +3,10 @@
 //! From here on the line side may go on with its own memory, and all arithmetic is in `f32`: times are nanoseconds
 //! in 64 bits until the window's middle is taken off.
 
+use super::model::NO_SKEW;
 use super::storage::EstimatorStorage;
 use super::window::{SampleBuffer, pack_weight, skew_unit_ns, unpack_weight};
 use crate::timeline::Group;
-
-/// A sample is skewed where its time is off its frame's and slot's by more than this many skew units.
-const NO_SKEW: u16 = 16;
 
 /// What a window is, as far as the fit wants to know.
 #[derive(Clone, Copy, Debug, Default)]

@@ -27,6 +27,7 @@ mod load;
 mod model;
 mod phase;
 mod plan;
+mod rows;
 mod search;
 mod storage;
 mod tones;

@@ -4,7 +4,7 @@ use microfft::Complex32 as Complex;
 
 use super::blur::blur;
 use super::phase::{Frequency, cos_sin, turns};
-use super::window::unpack_weight;
+use super::rows;
 use crate::report::MAX_PEAKS;
 use crate::timeline::Spread;
 
@@ -14,9 +14,8 @@ pub(crate) const TABLE_ROWS: usize = MAX_PEAKS + 1;
 /// Powers of time a tone's amplitude and phase may need: 1, t, t².
 pub(crate) const POWERS: usize = 3;
 
-/// Independent sums, so that the additions of a dot product need not wait for each other; a
-/// microcontroller has neither the pipeline nor the registers for it.
-const LANES: usize = if cfg!(target_arch = "arm") { 1 } else { 8 };
+/// A sample is skewed where its time is off its frame's and slot's by more than this many steps.
+pub(crate) const NO_SKEW: u16 = 16;
 
 /// One sinusoid: Re(conj(amplitude) · (1 + growth·t) · e^(2πi(f·t + chirp·t²/2))), t in window lengths.
 #[derive(Clone, Copy, Debug)]
@@ -178,47 +177,60 @@ impl Samples<'_> {
         let here = slot * n..slot * n + n;
         let at = self.slot_t[slot];
         let (linear, square) = (drift[0] + 2.0 * drift[1] * at, drift[1]);
-        for ((r, &x), &t) in self.row[..n]
-            .iter_mut()
-            .zip(&self.shift_px[here.clone()])
-            .zip(&self.frame_t[..n])
-        {
-            *r = x - t * (linear + square * t);
-        }
-        for (i, tone) in tones.iter().enumerate() {
-            if tone.modulated {
-                self.own_phasors(tone, slot);
-                let a = tone.amplitude;
-                for i in 0..n {
-                    let grown = 1.0 + tone.growth * self.row_t[i];
-                    self.row[i] -= grown * (a.re * self.own_re[i] + a.im * self.own_im[i]);
-                }
-                continue;
-            }
+        let shifts = &self.shift_px[here.clone()];
+        rows::less_drift(
+            &mut self.row[..n],
+            shifts,
+            &self.frame_t[..n],
+            linear,
+            square,
+        );
+        let late = self.late(here.clone());
+        for (i, tone) in tones.iter().enumerate().filter(|(_, t)| !t.modulated) {
             let k = i + 1;
             let g = tone.amplitude * self.slot_phasor(k, slot).conj();
-            let re = &self.frame_re[k * n..k * n + n];
-            let im = &self.frame_im[k * n..k * n + n];
-            for ((r, &p), &q) in self.row[..n].iter_mut().zip(re).zip(im) {
-                *r -= g.re * p + g.im * q;
-            }
-            if let Some(step_ns) = self.skew_ns {
-                let w = core::f32::consts::TAU * tone.frequency.hz() * 1e-9 * step_ns;
-                let skew = &self.skew[here.clone()];
-                for (((r, &p), &q), &d) in self.row[..n].iter_mut().zip(re).zip(im).zip(skew) {
-                    *r -= w * f32::from(d) * (g.im * p - g.re * q);
+            let phasors = (
+                &self.frame_re[k * n..k * n + n],
+                &self.frame_im[k * n..k * n + n],
+            );
+            let row = &mut self.row[..n];
+            match late {
+                None => rows::less_tone(row, phasors.0, phasors.1, g),
+                Some(step_ns) => {
+                    let turn = core::f32::consts::TAU * tone.frequency.hz() * 1e-9 * step_ns;
+                    rows::less_late_tone(row, phasors, &self.row_t[..n], turn, g);
                 }
+            }
+        }
+        // These use `row_t` for their own times.
+        for tone in tones.iter().filter(|t| t.modulated) {
+            self.own_phasors(tone, slot);
+            let a = tone.amplitude;
+            for i in 0..n {
+                let grown = 1.0 + tone.growth * self.row_t[i];
+                self.row[i] -= grown * (a.re * self.own_re[i] + a.im * self.own_im[i]);
             }
         }
         let weight = &self.weight[here];
         let row = &mut self.row[..n];
         let total = self.slot_weight[slot];
         let mean = if total > 0.0 {
-            weighted_sum(weight, row) / total
+            rows::weighted_sum(weight, row) / total
         } else {
             0.0
         };
-        center(weight, row, mean)
+        rows::center(weight, row, mean)
+    }
+
+    /// Leaves the skews of one slot's samples in `row_t`, where there are any; a step of them, ns.
+    fn late(&mut self, here: core::ops::Range<usize>) -> Option<f32> {
+        let step_ns = self.skew_ns?;
+        let mut any = false;
+        for (late, &skew) in self.row_t.iter_mut().zip(&self.skew[here]) {
+            *late = f32::from(skew);
+            any |= skew.unsigned_abs() > NO_SKEW;
+        }
+        any.then_some(step_ns)
     }
 
     /// One pass: the residual's weighted sum of squares, its products with the drift (t, t²) and the moments of
@@ -256,16 +268,9 @@ impl Samples<'_> {
                     *m += s;
                 }
             }
-            for ((rt, &r), &t) in self.row_t[..n]
-                .iter_mut()
-                .zip(&self.row[..n])
-                .zip(&self.frame_t[..n])
-            {
-                *rt = r * t;
-            }
-            let (row, row_t) = (&self.row[..n], &self.row_t[..n]);
-            let first: f32 = sum(row_t);
-            let second: f32 = dot(row_t, &self.frame_t[..n]);
+            let (row, row_t) = (&self.row[..n], &mut self.row_t[..n]);
+            let (first, second) = rows::times(row, &self.frame_t[..n], row_t);
+            let row_t = &self.row_t[..n];
             slow[0] += first;
             slow[1] += second + 2.0 * t * first;
             for (i, tone) in tones.iter().enumerate() {
@@ -276,7 +281,7 @@ impl Samples<'_> {
                 let re = &self.frame_re[k * n..k * n + n];
                 let im = &self.frame_im[k * n..k * n + n];
                 let q = self.slot_phasor(k, slot);
-                let (zero, one) = products(row, row_t, re, im);
+                let (zero, one) = rows::products(row, row_t, re, im);
                 let m = &mut moments[i];
                 m[0] += q * zero;
                 m[1] += q * (one + zero.scale(t));
@@ -284,101 +289,4 @@ impl Samples<'_> {
         }
         (squares, slow)
     }
-}
-
-/// Σ row·(re + i·im) and Σ row_t·(re + i·im).
-fn products(row: &[f32], row_t: &[f32], re: &[f32], im: &[f32]) -> (Complex, Complex) {
-    let mut sums = [[0.0_f32; LANES]; 4];
-    let whole = row.len() / LANES * LANES;
-    let chunks = row
-        .chunks_exact(LANES)
-        .zip(row_t.chunks_exact(LANES))
-        .zip(re.chunks_exact(LANES).zip(im.chunks_exact(LANES)));
-    for ((r, rt), (p, q)) in chunks {
-        for l in 0..LANES {
-            sums[0][l] += r[l] * p[l];
-            sums[1][l] += r[l] * q[l];
-            sums[2][l] += rt[l] * p[l];
-            sums[3][l] += rt[l] * q[l];
-        }
-    }
-    let mut total = sums.map(|s| s.iter().sum::<f32>());
-    for i in whole..row.len() {
-        total[0] += row[i] * re[i];
-        total[1] += row[i] * im[i];
-        total[2] += row_t[i] * re[i];
-        total[3] += row_t[i] * im[i];
-    }
-    (
-        Complex::new(total[0], total[1]),
-        Complex::new(total[2], total[3]),
-    )
-}
-
-fn sum(a: &[f32]) -> f32 {
-    let mut sums = [0.0_f32; LANES];
-    let chunks = a.chunks_exact(LANES);
-    let rest: f32 = chunks.remainder().iter().sum();
-    for c in chunks {
-        for l in 0..LANES {
-            sums[l] += c[l];
-        }
-    }
-    sums.iter().sum::<f32>() + rest
-}
-
-fn dot(a: &[f32], b: &[f32]) -> f32 {
-    let mut sums = [0.0_f32; LANES];
-    let (ca, cb) = (a.chunks_exact(LANES), b.chunks_exact(LANES));
-    let rest: f32 = ca
-        .remainder()
-        .iter()
-        .zip(cb.remainder())
-        .map(|(x, y)| x * y)
-        .sum();
-    for (x, y) in ca.zip(cb) {
-        for l in 0..LANES {
-            sums[l] += x[l] * y[l];
-        }
-    }
-    sums.iter().sum::<f32>() + rest
-}
-
-fn weighted_sum(weight: &[u16], row: &[f32]) -> f32 {
-    let mut sums = [0.0_f32; LANES];
-    let (cw, cr) = (weight.chunks_exact(LANES), row.chunks_exact(LANES));
-    let rest: f32 = cw
-        .remainder()
-        .iter()
-        .zip(cr.remainder())
-        .map(|(&w, r)| unpack_weight(w) * r)
-        .sum();
-    for (w, r) in cw.zip(cr) {
-        for l in 0..LANES {
-            sums[l] += unpack_weight(w[l]) * r[l];
-        }
-    }
-    sums.iter().sum::<f32>() + rest
-}
-
-/// Takes `mean` off the row and multiplies by the weights; returns the weighted sum of squares.
-fn center(weight: &[u16], row: &mut [f32], mean: f32) -> f32 {
-    let mut sums = [0.0_f32; LANES];
-    let mut cw = weight.chunks_exact(LANES);
-    let mut cr = row.chunks_exact_mut(LANES);
-    for (w, r) in (&mut cw).zip(&mut cr) {
-        for l in 0..LANES {
-            let x = r[l] - mean;
-            let y = x * unpack_weight(w[l]);
-            sums[l] += x * y;
-            r[l] = y;
-        }
-    }
-    let mut total = sums.iter().sum::<f32>();
-    for (&w, r) in cw.remainder().iter().zip(cr.into_remainder()) {
-        let x = *r - mean;
-        *r = x * unpack_weight(w);
-        total += x * *r;
-    }
-    total
 }
