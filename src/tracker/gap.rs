@@ -84,7 +84,8 @@ impl Gap {
         // A tone goes no further than 1.4 of its standard deviations.
         let most = 2.0 * libm::sqrtf(self.after2);
         if away.is_finite() {
-            self.mean_after + away.clamp(-most, most)
+            // Not `clamp`: it panics where `most` is no number, and brings the printing of floats with it.
+            self.mean_after + away.max(-most).min(most)
         } else {
             self.mean_after
         }
