@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# The core's unit and integration tests on 64-bit Arm (Raspberry Pi), on a machine of another kind: built for
+# The core's unit tests on 64-bit Arm (Raspberry Pi), on a machine of another kind: built for
 # it, run under user-mode emulation, once on a processor with the dot-product instructions (Raspberry Pi 5)
 # and once without (3, 4, Zero 2). The kernels' test compares every one of them bit by bit with plain Rust.
 #

@@ -12,6 +12,9 @@ use rowtone::report::Report;
 use rowtone::wire::{Message, text};
 use serialport::{SerialPort, TTYPort};
 
+/// How long to wait for something to come at all: an emulated program on a busy machine takes its time.
+const PATIENCE: Duration = Duration::from_secs(120);
+
 /// The program, ended when the test fails.
 struct Program(Child);
 
@@ -108,7 +111,7 @@ fn terminate(program: &Program) {
 fn sigterm_in_the_middle_of_a_window_sends_what_was_measured_and_exits_with_0() {
     let (mut program, mut ours, _theirs) = start("sigterm", "window_s = 1.0\nhop_s = 1.0");
     let mut reports = Reports::new(&mut ours);
-    let patience = Duration::from_secs(30);
+    let patience = PATIENCE;
     reports.next(patience).expect("a first report");
     let began = Instant::now();
     let second = reports.next(patience).expect("a second report");
@@ -151,11 +154,16 @@ fn memory_does_not_grow_once_reports_flow() {
     let mut reports = Reports::new(&mut ours);
     let mut resident = Vec::new();
     while resident.len() < 50 {
-        reports.next(Duration::from_secs(30)).expect("reports");
+        reports.next(PATIENCE).expect("reports");
         resident.push(resident_kib(&program));
     }
-    // Pages of code that are used for the first time count too: a little is allowed.
     let (early, late) = (resident[9], resident[49]);
+    if std::env::var_os("ROWTONE_PROGRAM").is_some() {
+        return eprintln!(
+            "not compared: an emulator's own memory would count ({early} and {late} KiB)"
+        );
+    }
+    // Pages of code that are used for the first time count too: a little is allowed.
     assert!(late <= early + 256, "{resident:?}");
     eprintln!("resident after 10 and after 50 reports: {early} and {late} KiB");
 }
