@@ -132,7 +132,7 @@ impl RawFormat {
 }
 
 /// Bytes behind a line that [`RawFormat::upper_line`] likes to have.
-pub const UPPER_SPARE: usize = 32;
+pub const UPPER_SPARE: usize = 16;
 
 impl RawFormat {
     /// The first `width` pixels of a line, of each its upper eight bits: half the bytes to work on, and packed

@@ -49,7 +49,7 @@ aarch64() {
 }
 
 deb() {
-    need gcc-aarch64-linux-gnu g++-aarch64-linux-gnu libc6-dev-arm64-cross qemu-user-static libclang-dev pkg-config
+    need gcc-aarch64-linux-gnu g++-aarch64-linux-gnu libc6-dev-arm64-cross libclang-dev pkg-config
     package=$(boards/rpi/deb.sh)
     dpkg-deb --info "$package"
     dpkg-deb --contents "$package"
@@ -60,7 +60,8 @@ deb() {
     dpkg --root="$folder" --force-script-chrootless --force-architecture --force-depends --force-not-root \
         --install "$package"
     sysroot=$(boards/rpi/ci/arm64-sysroot.sh)
-    export ROWTONE_PROGRAM="qemu-aarch64-static -L $sysroot $folder/usr/bin/rowtone-rpi"
+    qemu=$(boards/rpi/ci/qemu-aarch64.sh)
+    export ROWTONE_PROGRAM="$qemu -L $sysroot $folder/usr/bin/rowtone-rpi"
     cargo test --locked -p rowtone-rpi --test program -- --test-threads 1
     # And with its own libcamera's virtual camera; the test itself is this machine's and links to the one built here.
     prefix=$(boards/rpi/ci/libcamera.sh)

@@ -7,38 +7,42 @@ use super::Kernel;
 ))]
 use super::Kind;
 
-/// Which bytes are wanted of a vector's 16.
+/// Pixels of a step: what is written stays aligned where the line is, which matters more than anything else here.
+#[cfg_attr(
+    not(any(
+        target_arch = "x86_64",
+        all(target_arch = "aarch64", target_feature = "neon")
+    )),
+    allow(dead_code)
+)]
+const STEP: usize = 16;
+
+/// Which bytes are wanted of two vectors of 16 bytes, the second of which begins some bytes after the first.
 #[derive(Debug)]
+#[cfg_attr(
+    not(any(
+        target_arch = "x86_64",
+        all(target_arch = "aarch64", target_feature = "neon")
+    )),
+    allow(dead_code)
+)]
 pub(crate) struct Gather {
-    /// Their places, the rest marked by a top bit.
+    /// Their places: eight in the first vector, the same eight in the second, 16 added.
     index: [u8; 16],
-    /// How many they are.
-    pixels: usize,
-    /// Bytes of which they are all that is wanted: whole groups of packed pixels.
-    bytes: usize,
-    /// Of two vectors' results side by side the 32-bit words that are full.
-    #[cfg_attr(not(target_arch = "x86_64"), allow(dead_code))]
-    words: [i32; 8],
+    /// Bytes from the first to the second: whole groups, of eight pixels.
+    half: usize,
 }
 
 /// The upper eight bits of 10-bit pixels: four bytes of every five.
 pub(crate) const PACKED10: Gather = Gather {
-    index: [
-        0, 1, 2, 3, 5, 6, 7, 8, 10, 11, 12, 13, 0x80, 0x80, 0x80, 0x80,
-    ],
-    pixels: 12,
-    bytes: 15,
-    words: [0, 1, 2, 4, 5, 6, 7, 7],
+    index: [0, 1, 2, 3, 5, 6, 7, 8, 16, 17, 18, 19, 21, 22, 23, 24],
+    half: 10,
 };
 
 /// The upper eight bits of 12-bit pixels: two bytes of every three.
 pub(crate) const PACKED12: Gather = Gather {
-    index: [
-        0, 1, 3, 4, 6, 7, 9, 10, 0x80, 0x80, 0x80, 0x80, 0x80, 0x80, 0x80, 0x80,
-    ],
-    pixels: 8,
-    bytes: 12,
-    words: [0, 1, 4, 5, 7, 7, 7, 7],
+    index: [0, 1, 3, 4, 6, 7, 9, 10, 16, 17, 19, 20, 22, 23, 25, 26],
+    half: 12,
 };
 
 impl Kernel {
@@ -52,9 +56,9 @@ impl Kernel {
         )))]
         let _ = (what, from, to, pixels);
         match self.0 {
-            // SAFETY: `fastest` made this kind after it asked the processor for AVX2.
+            // SAFETY: `fastest` made these kinds after it asked the processor for AVX2, which has SSSE3 in it.
             #[cfg(target_arch = "x86_64")]
-            Kind::Avx2 => unsafe { avx2(what, from, to, pixels) },
+            Kind::Avx2 | Kind::Avx512 => unsafe { ssse3(what, from, to, pixels) },
             // SAFETY: the program was compiled for processors with NEON.
             #[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
             Kind::Neon | Kind::NeonDot => unsafe { neon(what, from, to, pixels) },
@@ -63,48 +67,32 @@ impl Kernel {
     }
 }
 
-/// Steps that stay within both sides: each reads and writes so much and goes on by so much.
-#[cfg(any(
-    target_arch = "x86_64",
-    all(target_arch = "aarch64", target_feature = "neon")
-))]
-fn steps(from: (usize, usize, usize), to: (usize, usize, usize)) -> usize {
-    let fit = |(has, touches, goes_on): (usize, usize, usize)| {
-        has.checked_sub(touches)
-            .map_or(0, |rest| rest / goes_on + 1)
-    };
-    fit(from).min(fit(to))
-}
-
-/// Two vectors a step: fewer and larger stores, which the sums that follow wait for.
 #[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-fn avx2(what: &Gather, from: &[u8], to: &mut [u8], pixels: usize) -> usize {
+#[target_feature(enable = "ssse3")]
+fn ssse3(what: &Gather, from: &[u8], to: &mut [u8], pixels: usize) -> usize {
     use core::arch::x86_64::*;
-    let (bytes, a_step) = (2 * what.bytes, 2 * what.pixels);
-    // SAFETY: the arrays are 16 and 32 bytes long and the loads need no alignment.
-    let (index, words) = unsafe {
-        (
-            _mm_loadu_si128(what.index.as_ptr().cast()),
-            _mm256_loadu_si256(what.words.as_ptr().cast()),
-        )
-    };
-    let index = _mm256_broadcastsi128_si256(index);
-    let fit = steps((from.len(), what.bytes + 16, bytes), (to.len(), 32, a_step));
-    let steps = fit.min(pixels.div_ceil(a_step));
-    for step in 0..steps {
-        // SAFETY: `steps` are so few that all bytes read and written lie within the slices.
+    // SAFETY: the array is 16 bytes long and the load needs no alignment.
+    let index = unsafe { _mm_loadu_si128(what.index.as_ptr().cast()) };
+    // A place with its top bit set gives 0; of the others the lower four bits count.
+    let none = _mm_set1_epi8(i8::MIN);
+    let (first, second) = (
+        _mm_unpacklo_epi64(index, none),
+        _mm_unpackhi_epi64(none, index),
+    );
+    let (mut at, mut done) = (0, 0);
+    // Comparing costs less than to divide for the number of steps.
+    while done < pixels && at + what.half + 16 <= from.len() && done + STEP <= to.len() {
+        // SAFETY: all bytes read and written lie within the slices, as was just asked.
         unsafe {
-            let at = from.as_ptr().add(step * bytes);
-            let low = _mm_loadu_si128(at.cast());
-            let high = _mm_loadu_si128(at.add(what.bytes).cast());
-            let both = _mm256_inserti128_si256::<1>(_mm256_castsi128_si256(low), high);
-            let picked = _mm256_shuffle_epi8(both, index);
-            let picked = _mm256_permutevar8x32_epi32(picked, words);
-            _mm256_storeu_si256(to.as_mut_ptr().add(step * a_step).cast(), picked);
+            let low = _mm_loadu_si128(from.as_ptr().add(at).cast());
+            let high = _mm_loadu_si128(from.as_ptr().add(at + what.half).cast());
+            let picked = _mm_or_si128(_mm_shuffle_epi8(low, first), _mm_shuffle_epi8(high, second));
+            _mm_storeu_si128(to.as_mut_ptr().add(done).cast(), picked);
         }
+        at += 2 * what.half;
+        done += STEP;
     }
-    pixels.min(steps * a_step)
+    pixels.min(done)
 }
 
 #[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
@@ -113,15 +101,17 @@ fn neon(what: &Gather, from: &[u8], to: &mut [u8], pixels: usize) -> usize {
     use core::arch::aarch64::*;
     // SAFETY: the array is 16 bytes long and the load needs no alignment.
     let index = unsafe { vld1q_u8(what.index.as_ptr()) };
-    let fit = steps((from.len(), 16, what.bytes), (to.len(), 16, what.pixels));
-    let steps = fit.min(pixels.div_ceil(what.pixels));
-    for step in 0..steps {
-        // SAFETY: `steps` are so few that all bytes read and written lie within the slices.
+    let (mut at, mut done) = (0, 0);
+    while done < pixels && at + what.half + 16 <= from.len() && done + STEP <= to.len() {
+        // SAFETY: all bytes read and written lie within the slices, as was just asked.
         unsafe {
-            let bytes = vld1q_u8(from.as_ptr().add(step * what.bytes));
-            let picked = vqtbl1q_u8(bytes, index);
-            vst1q_u8(to.as_mut_ptr().add(step * what.pixels), picked);
+            let low = vld1q_u8(from.as_ptr().add(at));
+            let high = vld1q_u8(from.as_ptr().add(at + what.half));
+            let picked = vqtbl2q_u8(uint8x16x2_t(low, high), index);
+            vst1q_u8(to.as_mut_ptr().add(done), picked);
         }
+        at += 2 * what.half;
+        done += STEP;
     }
-    pixels.min(steps * what.pixels)
+    pixels.min(done)
 }

@@ -3,7 +3,7 @@
 //! Runs where `ROWTONE_LIBCAMERA` names a libcamera that `ci/libcamera.sh` has built; ci.sh does both. libcamera
 //! allows one camera manager a process at a time, and the pictures are named in one file, so this is one test.
 //!
-//! `ROWTONE_PROGRAM` may name another build of the program (`qemu-aarch64-static … rowtone-rpi`), whose libcamera is
+//! `ROWTONE_PROGRAM` may name another build of the program (`qemu-aarch64 … rowtone-rpi`), whose libcamera is
 //! then that of `ROWTONE_LIBCAMERA`; what is tested within this process is left out.
 #![cfg(feature = "libcamera")]
 

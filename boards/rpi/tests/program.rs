@@ -1,6 +1,6 @@
 //! The program itself, on its simulated camera: its exit status, its last report, its memory, what it says.
 //!
-//! `ROWTONE_PROGRAM` may name another build of it, words before it included: `qemu-aarch64-static … rowtone-rpi`.
+//! `ROWTONE_PROGRAM` may name another build of it, words before it included: `qemu-aarch64 … rowtone-rpi`.
 
 use std::fs;
 use std::io::Read;
