@@ -130,13 +130,6 @@ fn configure(cli: &Cli) -> Result<Config, String> {
 }
 
 fn measure(cli: &Cli, config: &Config) -> ExitCode {
-    let mut open = match opener(cli.simulate) {
-        Ok(open) => open,
-        Err(e) => {
-            log(&e.to_string());
-            return ExitCode::FAILURE;
-        }
-    };
     let shared = Shared::new(config.settings);
     let asked = Arc::new(AtomicBool::new(false));
     for signal in [signal_hook::consts::SIGTERM, signal_hook::consts::SIGINT] {
@@ -144,6 +137,14 @@ fn measure(cli: &Cli, config: &Config) -> ExitCode {
             log(&format!("signal {signal} cannot be caught: {e}"));
         }
     }
+    // Starting libcamera takes a moment in which a signal may come.
+    let mut open = match opener(cli.simulate) {
+        Ok(open) => open,
+        Err(e) => {
+            log(&e.to_string());
+            return ExitCode::FAILURE;
+        }
+    };
     let done = AtomicBool::new(false);
     let outcome = std::thread::scope(|scope| {
         let (shared, asked, done) = (&shared, &asked, &done);

@@ -8,7 +8,7 @@
 #![cfg(feature = "libcamera")]
 
 use std::fs;
-use std::io::Read;
+use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
@@ -316,12 +316,17 @@ fn the_program_reports_the_right_peaks() {
 }
 
 fn a_missing_camera_is_said_and_waited_for() {
-    let program = program(&["--output", "-", "--camera", "imx477"], "");
-    std::thread::sleep(Duration::from_secs(3));
+    let mut program = program(&["--output", "-", "--camera", "imx477"], "");
+    // Until it has waited twice, however long an emulated libcamera takes.
+    let mut said = String::new();
+    let mut stderr = BufReader::new(program.0.stderr.take().unwrap());
+    while !said.contains("next try in 1.0 s") {
+        assert!(stderr.read_line(&mut said).unwrap() > 0, "{said}");
+    }
+    assert!(said.contains("no camera is called \"imx477\""), "{said}");
+    program.0.stderr = Some(stderr.into_inner());
     let (status, said) = terminate(program);
     assert_eq!(status, Some(0), "{said}");
-    assert!(said.contains("no camera is called \"imx477\""), "{said}");
-    assert!(said.contains("next try in 1.0 s"), "{said}");
 }
 
 fn listen(port: &mut impl Read, mut enough: impl FnMut(Report) -> bool) {
