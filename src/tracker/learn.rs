@@ -99,7 +99,8 @@ impl Tracker<'_> {
             }
             Stage::Tracking => {}
         }
-        self.prediction.end_round(self.usual_information());
+        self.prediction
+            .end_round(self.usual_information(), self.range_px);
         self.blur.end_round();
         self.meter = NoiseMeter::default();
         self.range_px = 0.0;

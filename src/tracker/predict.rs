@@ -3,9 +3,8 @@
 //! Mostly the picture hardly moves from row to row, and the information-weighted mean of the last rows
 //! says where the next one is: one that knows little is carried by its neighbours. Where the motion is
 //! swift, its speed and how that changes count too (a fading-memory filter of second order, Morrison 1969),
-//! and over the gap
-//! between two frames, in which nothing is seen, the frames before tell what usually happens
-//! ([`Gap`]).
+//! and over the gap between two frames, in which nothing is seen, the frames before tell what usually
+//! happens ([`Gap`]).
 
 use super::gap::Gap;
 
@@ -19,6 +18,8 @@ pub(super) struct Prediction {
     change_px: f32,
     /// Rows added since nothing was known, up to 3.
     known: u8,
+    /// The last round's motion went further than one inner product reaches.
+    far: bool,
     /// Information of a row with texture, the mean over all, 1/px²; 0 until that is known.
     usual_information: f32,
     /// What the last row and the one before came to, px.
@@ -35,8 +36,13 @@ impl Prediction {
     const KEEP: f32 = 0.75;
     /// The same where the motion is swift: at 1 kHz a row's 34 µs are a fifth of a radian.
     const KEEP_SWIFT: f32 = 0.5;
-    /// A row that is further from where it was expected makes the motion swift, px².
-    const SWIFT_PX2: f32 = 0.2;
+    /// A row that is further from where it was expected makes the motion swift, px²: one inner product
+    /// would not do any more.
+    const SWIFT_PX2: f32 = 0.5;
+    /// Motion that goes no further than this is found from anywhere within it, px.
+    const SMALL_PX: f32 = 2.0;
+    /// No row's place is surer than this against its neighbour's, 1/px²: their references are not.
+    const MOST_INFORMATION: f32 = 1e4;
     /// For so many frames.
     const SWIFT_FRAMES: u8 = 64;
     /// Over more rows than this the speed tells nothing.
@@ -52,10 +58,10 @@ impl Prediction {
         self.shift_px + rows * (self.speed_px + 0.5 * rows * self.change_px)
     }
 
-    /// The motion is swift.
+    /// The motion is large and swift.
     #[inline]
     pub(super) fn is_swift(&self) -> bool {
-        self.swift_frames > 0
+        self.swift_frames > 0 && self.far
     }
 
     /// Speed at a row that is at `shift_px`, px a row, and how it changes from row to row. Good rows tell by
@@ -64,14 +70,20 @@ impl Prediction {
         let [last, before] = self.last_px;
         let speed = 1.5 * shift_px - 2.0 * last + 0.5 * before;
         let next = row == usize::from(self.row) + 1;
-        // Five standard deviations of the difference; of the filtered speed even more.
-        if next && self.known == 3 && speed * speed * information > 160.0 {
-            return (speed, shift_px - 2.0 * last + before);
+        if self.known < 3 {
+            return (0.0, 0.0);
         }
-        if self.speed_px * self.speed_px * self.information > 20.0 {
-            return (self.speed_px, self.change_px);
+        // Five standard deviations of the difference; the rows before may know less than this one.
+        let information = information
+            .min(0.5 * self.information)
+            .min(Self::MOST_INFORMATION);
+        if next && speed * speed * information > 160.0 {
+            (speed, shift_px - 2.0 * last + before)
+        } else if self.speed_px * self.speed_px * information > 160.0 {
+            (self.speed_px, self.change_px)
+        } else {
+            (0.0, 0.0)
         }
-        (0.0, 0.0)
     }
 
     /// A swift picture must be found anew after a gap, and a row that knows so little could take any place
@@ -106,7 +118,7 @@ impl Prediction {
         let expected = self.at(row);
         let surprise = shift_px - expected;
         let square = surprise * surprise;
-        if square > Self::SWIFT_PX2 && square * information > 16.0 {
+        if square > Self::SWIFT_PX2 && square * information > 36.0 {
             self.swift_frames = Self::SWIFT_FRAMES;
         }
         if self.gap.is_open() {
@@ -171,10 +183,11 @@ impl Prediction {
     }
 
     /// A round of learning has ended: what is known of the motion stays, where the picture is does not.
-    /// `usual_information`: of a row with texture, 1/px².
-    pub(super) fn end_round(&mut self, usual_information: f32) {
+    /// `usual_information`: of a row with texture, 1/px²; `range_px`: how far the motion went.
+    pub(super) fn end_round(&mut self, usual_information: f32, range_px: f32) {
         self.forget();
         self.gap.end_round();
+        self.far = range_px > Self::SMALL_PX;
         self.usual_information = usual_information;
         self.shift_px = self.gap.expected_px();
     }
