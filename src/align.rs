@@ -1,6 +1,10 @@
 //! A line shifted back by its own displacement, averaged into its reference.
 
-use crate::{pixel::Pixel, reference::Recipe};
+use crate::{
+    kernel::{self, Kernel, Wide},
+    pixel::Pixel,
+    reference::Recipe,
+};
 use core::ops::Range;
 
 /// Shifts smaller than this blur nothing: the line is averaged in as it is, px.
@@ -58,36 +62,17 @@ impl Averaging {
     fn mix(&self, mean: &mut u16, value: f32) {
         let old = f32::from(*mean);
         let new = old - old * self.keep + value * self.counts_per_value * self.share;
-        *mean = (new + 0.5).clamp(0.0, 65535.0) as u16;
+        *mean = kernel::whole((new + 0.5).clamp(0.0, 65535.0));
     }
 
     /// Averages the whole line in.
-    pub(crate) fn all<P: Pixel>(&self, mean: &mut [u16], pixels: &[P]) {
-        let Some((first, weights)) = self.taps else {
-            for (m, p) in mean.iter_mut().take(self.to).zip(pixels) {
-                self.mix(m, f32::from(p.value()));
-            }
-            return;
-        };
-        let Ok(first) = usize::try_from(self.from as isize + first) else {
-            return;
-        };
-        let (Some(mean), Some(line)) = (
-            mean.get_mut(self.from..self.to.max(self.from)),
-            pixels.get(first..),
-        ) else {
-            return;
-        };
-        let tap = |k: usize| line.get(k * self.stride..).unwrap_or(&[]).iter();
-        let [a, b, c, d, e, f] = weights;
-        let pairs = [tap(0).zip(tap(1)), tap(2).zip(tap(3)), tap(4).zip(tap(5))];
-        let [first, second, third] = pairs;
-        for (m, ((ab, cd), ef)) in mean.iter_mut().zip(first.zip(second).zip(third)) {
-            let v = |p: &P| f32::from(p.value());
-            let value =
-                a * v(ab.0) + b * v(ab.1) + c * v(cd.0) + d * v(cd.1) + e * v(ef.0) + f * v(ef.1);
-            self.mix(m, value);
-        }
+    pub(crate) fn all<P: Pixel>(&self, kernel: Kernel, mean: &mut [u16], pixels: &[P]) {
+        let averaging = *self;
+        kernel.run(All {
+            averaging,
+            mean,
+            pixels,
+        });
     }
 
     /// Averages the columns of `span` in; the line was kept by [`Pixel::pack`].
@@ -108,6 +93,45 @@ impl Averaging {
                 }
             };
             self.mix(m, value);
+        }
+    }
+}
+
+/// A whole line.
+struct All<'a, P> {
+    averaging: Averaging,
+    mean: &'a mut [u16],
+    pixels: &'a [P],
+}
+
+impl<P: Pixel> Wide for All<'_, P> {
+    #[inline(always)]
+    fn run(self) {
+        let (averaging, mean, pixels) = (self.averaging, self.mean, self.pixels);
+        let Some((first, weights)) = averaging.taps else {
+            for (m, p) in mean.iter_mut().take(averaging.to).zip(pixels) {
+                averaging.mix(m, f32::from(p.value()));
+            }
+            return;
+        };
+        let Ok(first) = usize::try_from(averaging.from as isize + first) else {
+            return;
+        };
+        let (Some(mean), Some(line)) = (
+            mean.get_mut(averaging.from..averaging.to.max(averaging.from)),
+            pixels.get(first..),
+        ) else {
+            return;
+        };
+        let tap = |k: usize| line.get(k * averaging.stride..).unwrap_or(&[]).iter();
+        let [a, b, c, d, e, f] = weights;
+        let pairs = [tap(0).zip(tap(1)), tap(2).zip(tap(3)), tap(4).zip(tap(5))];
+        let [first, second, third] = pairs;
+        for (m, ((ab, cd), ef)) in mean.iter_mut().zip(first.zip(second).zip(third)) {
+            let v = |p: &P| f32::from(p.value());
+            let value =
+                a * v(ab.0) + b * v(ab.1) + c * v(cd.0) + d * v(cd.1) + e * v(ef.0) + f * v(ef.1);
+            averaging.mix(m, value);
         }
     }
 }
@@ -166,7 +190,7 @@ pub(crate) fn lagrange(t: f32) -> [f32; 6] {
 
 #[cfg(test)]
 mod tests {
-    use super::{Averaging, Recipe, lagrange, move_row_by};
+    use super::{Averaging, Kernel, Recipe, lagrange, move_row_by};
 
     #[test]
     fn polynomials_of_fifth_degree_are_exact() {
@@ -200,7 +224,7 @@ mod tests {
                 let recipe = Recipe { stride, ..recipe };
                 let averaging = Averaging::new(shift_px, 0.21, 0.2, &recipe, 37);
                 let (mut at_once, mut in_steps) = ([9000; 37], [9000; 37]);
-                averaging.all(&mut at_once, &line);
+                averaging.all(Kernel::detect(), &mut at_once, &line);
                 for start in (0..37).step_by(5) {
                     averaging.some::<u8>(start..start + 5, &mut in_steps, &kept);
                 }
@@ -225,7 +249,7 @@ mod tests {
                 for shift in [shift, -shift] {
                     let mut mean = [777; 32];
                     let averaging = Averaging::new(shift, 0.5, 0.5, &recipe(stride), 32);
-                    averaging.all(&mut mean, &[200u8; 32]);
+                    averaging.all(Kernel::detect(), &mut mean, &[200u8; 32]);
                     averaging.some::<u8>(0..32, &mut mean, &[0.0; 8]);
                     assert_eq!(mean, [777; 32], "{shift}");
                 }

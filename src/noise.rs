@@ -1,6 +1,7 @@
 //! Noise of one pixel.
 
 use crate::{pixel::Pixel, reference::Recipe};
+use core::hint::select_unpredictable;
 
 /// Variance of a pixel: read noise and quantisation, plus shot noise in proportion to its value (the
 /// photon transfer of EMVA 1288, section 2).
@@ -34,8 +35,8 @@ impl PixelNoise {
 /// reference, shifted, is taken off.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct NoiseMeter {
-    /// Σ residual² and count, in [`BINS`] steps of brightness.
-    bins: [(f32, f32); BINS],
+    /// Σ residual² and count, in [`BINS`] steps of brightness, and of what does not count.
+    bins: [(f32, f32); BINS + 1],
 }
 
 const BINS: usize = 8;
@@ -55,36 +56,43 @@ impl NoiseMeter {
         let value = 1.0 / recipe.counts_per_value;
         let stride = recipe.stride;
         let steps = libm::roundf(shift_px / stride as f32) * stride as f32;
-        let (whole, near) = (steps as isize, shift_px - steps);
+        // The cast saturates: such a line meets nothing of its reference.
+        let (whole, near) = (steps as i32 as isize, shift_px - steps);
         let per_bin = BINS as f32 / recipe.saturation;
+        let per_px = 0.5 / stride as f32;
         let own = 1.0 + 1.0 / frames.max(1.0);
-        for x in (2 * stride..mean.len().saturating_sub(2 * stride)).step_by(3) {
-            let Some(&p) = (x as isize)
-                .checked_add(whole)
-                .and_then(|at| pixels.get(usize::try_from(at).ok()?))
-            else {
-                continue;
-            };
-            let (Some(&left), Some(&here), Some(&right)) =
-                (mean.get(x - stride), mean.get(x), mean.get(x + stride))
-            else {
-                continue;
-            };
+        // Every third column, from the first that has a neighbour and meets a pixel of the line.
+        let mut first = 2 * stride;
+        if whole.saturating_add_unsigned(first) < 0 {
+            first += (whole.unsigned_abs() - first).next_multiple_of(3);
+        }
+        let (Some(mean), Some(pixels)) = (
+            mean.get(first - stride..mean.len().saturating_sub(stride)),
+            pixels.get(first.wrapping_add_signed(whole)..),
+        ) else {
+            return;
+        };
+        let columns = mean.windows(2 * stride + 1).step_by(3);
+        for (around, p) in columns.zip(pixels.iter().step_by(3)) {
+            let &[left, .., right] = around else { return };
+            let here = around.get(stride).copied().unwrap_or(0);
             let (left, here, right) = (
                 f32::from(left) * value,
                 f32::from(here) * value,
                 f32::from(right) * value,
             );
-            let slope = (right - left) / (2.0 * stride as f32);
+            let slope = (right - left) * per_px;
             // On a steep edge what is left over is the shift's error, not the pixel's noise.
-            let noise = recipe.noise.variance(here);
-            if slope * slope > noise * 16.0 || here >= recipe.saturation {
-                continue;
-            }
+            let steep = slope * slope > recipe.noise.variance(here) * 16.0;
             let residual = f32::from(p.value()) - gain * (here - near * slope);
-            let square = residual * residual / own;
-            if let Some(bin) = self.bins.get_mut((here * per_bin) as usize) {
-                bin.0 += square;
+            // What does not count goes to a bin of its own: a branch would be foreseen half of the time.
+            let bin = select_unpredictable(
+                steep | (here >= recipe.saturation),
+                BINS,
+                ((here * per_bin) as i32 as usize).min(BINS),
+            );
+            if let Some(bin) = self.bins.get_mut(bin) {
+                bin.0 += residual * residual / own;
                 bin.1 += 1.0;
             }
         }
@@ -93,7 +101,7 @@ impl NoiseMeter {
     /// The straight line through what was measured; `None` until there is enough of it.
     pub fn noise(&self, saturation: f32) -> Option<PixelNoise> {
         let (mut n, mut sx, mut sy, mut sxx, mut sxy) = (0.0f32, 0.0f32, 0.0f32, 0.0f32, 0.0f32);
-        for (k, &(sum, count)) in self.bins.iter().enumerate() {
+        for (k, &(sum, count)) in self.bins.iter().take(BINS).enumerate() {
             if count < 50.0 {
                 continue;
             }

@@ -16,6 +16,7 @@ pub(crate) trait Pixel: Copy {
 }
 
 impl Pixel for u8 {
+    #[inline(always)]
     fn value(self) -> u16 {
         u16::from(self)
     }
@@ -44,6 +45,7 @@ impl Pixel for u8 {
 }
 
 impl Pixel for u16 {
+    #[inline(always)]
     fn value(self) -> u16 {
         self
     }

@@ -29,6 +29,27 @@ pub struct Sums {
     pub pixels: u64,
 }
 
+/// A loop that is worth compiling for wide vectors; its `run` must be `#[inline(always)]`, and so must be
+/// what it calls.
+pub(crate) trait Wide {
+    /// The loop.
+    fn run(self);
+}
+
+/// What stands in front of the point of 0 ≤ `v` < 2¹⁶. A cast does the same and is one instruction of most
+/// processors; on x86-64 it stays one value at a time, and this becomes vectors.
+#[inline(always)]
+pub(crate) fn whole(v: f32) -> u16 {
+    if cfg!(not(target_arch = "x86_64")) {
+        return v as u16;
+    }
+    // From 2²³ to 2²⁴ an f32 has no bits behind the point, and what is in front of it stands in its last bits.
+    const POINT_AT_THE_END: f32 = 8_388_608.0;
+    let nearest = v + POINT_AT_THE_END;
+    let above = nearest - POINT_AT_THE_END > v;
+    (nearest.to_bits() - u32::from(above)) as u16
+}
+
 /// Which implementation is used. Only those that the processor can run can be had.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Kernel(Kind);
@@ -113,6 +134,18 @@ impl Kernel {
         slower.into_iter().flatten().chain(better).map(Self)
     }
 
+    /// Runs a loop over floats, compiled for the vectors that this kernel's processor has. The bits are the
+    /// same as anywhere: Rust neither reorders float arithmetic nor fuses it.
+    #[inline]
+    pub(crate) fn run<W: Wide>(self, wide: W) {
+        match self.0 {
+            // SAFETY: `fastest` made these kinds after it asked the processor for AVX2.
+            #[cfg(target_arch = "x86_64")]
+            Kind::Avx2 | Kind::Avx512 => unsafe { x86_64::run(wide) },
+            _ => wide.run(),
+        }
+    }
+
     /// Sums over 8-bit pixels. The shorter length of the two counts. |h| ≤ [`MAX_COEFFICIENT`], or the
     /// sums are unspecified (never unsafe).
     #[inline]
@@ -124,7 +157,7 @@ impl Kernel {
             // SAFETY: `fastest` made this kind after it asked the processor for AVX2.
             #[cfg(target_arch = "x86_64")]
             Kind::Avx2 => unsafe { x86_64::sums_u8(pixels, coefficients) },
-            // SAFETY: `fastest` made this kind after it asked for AVX-512 F, BW, VL and VNNI.
+            // SAFETY: `fastest` made this kind after it asked for all of AVX-512 that these need.
             #[cfg(target_arch = "x86_64")]
             Kind::Avx512 => unsafe { x86_64_avx512::sums_u8(pixels, coefficients) },
             // SAFETY: the program was compiled for processors with NEON.
@@ -231,6 +264,18 @@ mod tests {
                 proptest::prop_assert_eq!(kernel.sums_u8(&bytes[at..], &h[at..]), exact(&bytes[at..], &h[at..]));
                 proptest::prop_assert_eq!(kernel.sums_u16(&deep[at..], &h[at..]), exact(&deep[at..], &h[at..]));
             }
+        }
+    }
+
+    #[test]
+    fn whole_numbers_are_those_of_a_cast() {
+        // Up to four bits behind the point, of both kinds of whole number.
+        for sixteenths in (0u32..70_000).chain(1_000_000..1_048_560) {
+            let v = sixteenths as f32 / 16.0;
+            assert_eq!(whole(v), v as u16, "{v}");
+        }
+        for v in [0.999_999_94, 65_534.996, 65_535.0] {
+            assert_eq!(whole(v), v as u16, "{v}");
         }
     }
 

@@ -54,6 +54,24 @@ fn sum_i64(v: __m256i) -> u64 {
     _mm_cvtsi128_si64(v) as u64
 }
 
+/// See [`super::Kernel::run`].
+#[target_feature(enable = "avx2")]
+pub(super) fn run<W: super::Wide>(wide: W) {
+    wide.run();
+}
+
+/// How far ahead memory is asked, bytes: some lines, so that the pauses between them are made use of.
+const AHEAD: usize = 8192;
+
+/// Asks memory for a later line's pixels: the next rows of a picture lie behind this one, and memory would
+/// else have nothing to do while what follows the inner product is computed.
+#[inline(always)]
+pub(super) fn ask_ahead(step: &[u8; 64]) {
+    let ahead = step.as_ptr().wrapping_add(AHEAD);
+    // SAFETY: a prefetch changes nothing that the program could see, and never faults, whatever the address.
+    unsafe { _mm_prefetch::<_MM_HINT_T1>(ahead.cast()) };
+}
+
 /// 64 bytes as two vectors.
 #[target_feature(enable = "avx2")]
 fn load<T>(bytes: &[T; 64]) -> [__m256i; 2] {
@@ -78,6 +96,7 @@ pub(super) fn sums_u8(pixels: &[u8], coefficients: &[i8]) -> Sums {
         let (mut product0, mut product1) = (zero, zero);
         let (mut plain0, mut plain1) = (zero, zero);
         for (p, h) in p_steps.iter().zip(h_steps) {
+            ask_ahead(p);
             let ([p0, p1], [h0, h1]) = (load(p), load(h));
             let m0 = _mm256_madd_epi16(_mm256_maddubs_epi16(p0, h0), ones);
             let m1 = _mm256_madd_epi16(_mm256_maddubs_epi16(p1, h1), ones);

@@ -1,7 +1,7 @@
 //! AVX-512 with VNNI: `vpdpbusd` multiplies 64 pixels by 64 coefficients and adds them four by four, in 32
 //! bits. The same instruction with ones for coefficients sums the pixels.
 
-use super::Sums;
+use super::{Sums, x86_64::ask_ahead};
 use core::arch::x86_64::*;
 
 /// Pixels a block: its sums fit 32 bits, 64·255·2¹⁶ < 2³¹.
@@ -85,6 +85,8 @@ fn block_u8(pixels: &[u8], coefficients: &[i8]) -> Block {
     let (p_pairs, p_single) = p_steps.as_chunks::<2>();
     let (h_pairs, h_single) = h_steps.as_chunks::<2>();
     for (p, h) in p_pairs.iter().zip(h_pairs) {
+        ask_ahead(&p[0]);
+        ask_ahead(&p[1]);
         let (p0, p1) = (load(&p[0]), load(&p[1]));
         product[0] = _mm512_dpbusd_epi32(product[0], p0, load(&h[0]));
         product[1] = _mm512_dpbusd_epi32(product[1], p1, load(&h[1]));
@@ -92,6 +94,7 @@ fn block_u8(pixels: &[u8], coefficients: &[i8]) -> Block {
         plain[1] = _mm512_dpbusd_epi32(plain[1], p1, ones);
     }
     for (p, h) in p_single.iter().zip(h_single) {
+        ask_ahead(p);
         let p = load(p);
         product[0] = _mm512_dpbusd_epi32(product[0], p, load(h));
         plain[0] = _mm512_dpbusd_epi32(plain[0], p, ones);

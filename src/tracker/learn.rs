@@ -157,7 +157,7 @@ impl Tracker<'_> {
         };
         let width = pixels.len();
         if let Some(mean) = self.storage.mean.get_mut(row * width..(row + 1) * width) {
-            averaging.all(mean, pixels);
+            averaging.all(self.config.kernel, mean, pixels);
         }
     }
 
