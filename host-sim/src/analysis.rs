@@ -1,4 +1,4 @@
-//! From displacements to reports: the core's binner and analyzer, fed frame by frame.
+//! From samples to reports: the core's analyzer, fed frame by frame.
 //!
 //! A [`Plan`] decides how many rows make a sample and how much memory a window takes; [`Analysis::run`]
 //! then hands every sample and every report to whoever wants them, as they come.
@@ -7,9 +7,10 @@ use rowtone::analyzer::Analyzer;
 use rowtone::camera::Timing;
 use rowtone::report::{Report, Warning};
 use rowtone::spectrum::Config;
-use rowtone::timeline::{Binner, Group, Sample, rows_per_sample};
+use rowtone::timeline::{Group, Sample, rows_per_sample};
 
 use crate::failure::Failure;
+use crate::input::Camera;
 use crate::memory::SpectrumMemory;
 use crate::tracking::{FrameShifts, Shifts, Unmeasured};
 
@@ -65,14 +66,13 @@ impl Plan {
     ///
     /// # Errors
     /// [`Failure::Usage`] for settings that cannot be used.
-    pub fn new(shifts: &Shifts, settings: &Settings) -> Result<Self, Failure> {
+    pub fn new(camera: &Camera, settings: &Settings) -> Result<Self, Failure> {
         let refuse = |error: &dyn std::fmt::Display| Failure::usage(error.to_string());
-        let camera = &shifts.camera;
         // Rows are counted from the top of the part.
         let timing = Timing::new(
             camera.timing.line_time_ps(),
             camera.timing.exposure_ns(),
-            shifts.part.height as u16,
+            camera.part_or_rest()?.height as u16,
         )
         .map_err(|error| refuse(&error))?;
         let frames = (settings.window_s * camera.fps).ceil() as u32;
@@ -95,6 +95,11 @@ impl Plan {
             fps: camera.fps,
             window_s: settings.window_s,
         })
+    }
+
+    /// How rows are to be combined.
+    pub fn groups(&self) -> Group {
+        self.group
     }
 
     /// The memory that the analysis borrows.
@@ -128,7 +133,6 @@ pub enum Event<'a> {
 #[derive(Debug)]
 pub struct Analysis<'a> {
     shifts: Shifts,
-    binner: Binner,
     analyzer: Analyzer<'a>,
     /// Since the last report.
     unmeasured: Unmeasured,
@@ -137,7 +141,7 @@ pub struct Analysis<'a> {
 }
 
 impl<'a> Analysis<'a> {
-    /// An analysis of what `shifts` delivers.
+    /// An analysis of what `shifts` delivers, which must combine rows in the plan's groups.
     ///
     /// # Errors
     /// [`Failure::Usage`] for settings that cannot be used.
@@ -150,7 +154,6 @@ impl<'a> Analysis<'a> {
             .map_err(|error| Failure::usage(error.to_string()))?;
         Ok(Self {
             shifts,
-            binner: Binner::new(plan.group),
             analyzer,
             unmeasured: Unmeasured::default(),
             rows: 0,
@@ -176,9 +179,6 @@ impl<'a> Analysis<'a> {
                 Err(failure) => break Err(failure),
             }
         };
-        if let Some(sample) = self.binner.finish() {
-            self.push(&sample, &mut on)?;
-        }
         if let Some(report) = self.analyzer.finish() {
             self.hand_on(report, &mut on)?;
         }
@@ -198,12 +198,10 @@ impl<'a> Analysis<'a> {
         on(Event::Frame(frame.start_ns))?;
         self.rows += self.shifts.part.height as u64;
         self.unmeasured += frame.unmeasured;
-        for &row in &frame.rows {
-            if let Some(sample) = self.binner.push(row) {
-                self.push(&sample, on)?;
-            }
-        }
-        Ok(())
+        frame
+            .samples
+            .iter()
+            .try_for_each(|sample| self.push(sample, on))
     }
 
     fn push(

@@ -100,9 +100,9 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         Sender::open(port, session, &as_a_board_says(args), may_wait)
     });
     let serial = serial.transpose()?;
-    let shifts = Shifts::start(Feed::open(&args.camera)?)?;
+    let feed = Feed::open(&args.camera)?;
     let plan = Plan::new(
-        &shifts,
+        &feed.camera,
         &Settings {
             window_s: args.window,
             hop_s: args.hop.unwrap_or(args.window / 2.0),
@@ -112,6 +112,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             um_per_px: args.camera.um_per_px,
         },
     )?;
+    let shifts = Shifts::start(feed, Some(plan.groups()))?;
     let picture = args.plot.clone().map(|path| {
         Picture::new(plot::Settings {
             path,

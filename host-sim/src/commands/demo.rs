@@ -79,12 +79,13 @@ pub fn run(_args: &Args) -> Result<(), Failure> {
         exposure_us: Some(f64::from(sensor.exposure_ns) * 1e-3),
         ..CameraArgs::of("the simulated camera")
     };
-    let shifts = Shifts::start(Feed::read(&options, from)?)?;
+    let feed = Feed::read(&options, from)?;
     let settings = Settings {
         max_hz: Some(1000.0),
         ..Settings::default()
     };
-    let plan = Plan::new(&shifts, &settings)?;
+    let plan = Plan::new(&feed.camera, &settings)?;
+    let shifts = Shifts::start(feed, Some(plan.groups()))?;
     let mut memory = plan.memory();
     let mut analysis = Analysis::new(shifts, &plan, &mut memory)?;
     let progress = Progress::new(Some(u64::from(SECONDS * 60)));

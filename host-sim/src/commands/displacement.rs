@@ -71,7 +71,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             "this format is not for a terminal: give -o FILE",
         ));
     }
-    let mut shifts = Shifts::start(Feed::open(&args.camera)?)?;
+    let mut shifts = Shifts::start(Feed::open(&args.camera)?, None)?;
     let rows_per_sample = rows_per_sample(args.rows_per_sample, &shifts);
     let slots = shifts.part.height.div_ceil(rows_per_sample);
     let mut series = Series::new(shifts.part.y, rows_per_sample, slots);

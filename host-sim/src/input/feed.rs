@@ -14,10 +14,11 @@ use super::{Camera, CameraArgs, Frame, Turn};
 use crate::failure::Failure;
 use crate::ring::{Inlet, Next as Arrival, Outlet, ring};
 
-/// Blocks of frames read ahead. Few, so that they stay in the cache between reading and measuring.
+/// Blocks of frames ahead of the lines.
 const BLOCKS: usize = 3;
-/// Size of a block, bytes. Whoever reads a pipe may be waiting for each frame and gets it at once.
-const BLOCK_BYTES: usize = 1 << 20;
+/// Size of a block, bytes: handing one over costs some 10 µs. Whoever reads a pipe may be waiting for each
+/// frame and gets it at once.
+const BLOCK_BYTES: usize = 4 << 20;
 
 /// How the reading ended.
 #[derive(Debug)]

@@ -64,31 +64,51 @@ impl Frame {
         }
     }
 
+    /// The luma plane of the (turned) picture.
+    fn plane(&self) -> Pixels<'_> {
+        match self.plane {
+            Plane::Raw => Pixels::U8(&self.raw[self.luma..]),
+            Plane::Turned => Pixels::U8(&self.turned),
+            Plane::Words => Pixels::U16(&self.words),
+        }
+    }
+
     /// Row `row` of a part of the (turned) picture. The part must lie inside it.
     pub fn pixels(&self, part: &Rect, row: usize) -> Pixels<'_> {
+        cut(self.plane(), self.row(part, row))
+    }
+
+    /// Where this row of a part is in the plane.
+    #[inline]
+    fn row(&self, part: &Rect, row: usize) -> Range<usize> {
         let start = (part.y + row) * self.width + part.x;
-        let range = start..start + part.width;
-        match self.plane {
-            Plane::Raw => Pixels::U8(&self.raw[self.luma..][range]),
-            Plane::Turned => Pixels::U8(&self.turned[range]),
-            Plane::Words => Pixels::U16(&self.words[range]),
-        }
+        start..start + part.width
     }
 
     /// The lines `rows` of a part of the picture, numbered from its top. `timing` is the whole
     /// picture's: a row's time depends on where it is in the picture.
+    #[inline]
     pub fn lines<'a>(
         &'a self,
         part: &'a Rect,
         timing: &'a Timing,
         rows: Range<usize>,
     ) -> impl Iterator<Item = Line<'a>> {
+        let plane = self.plane();
         rows.map(move |row| Line {
             frame: self.number,
             row: row as u16,
             start_ns: self.start_ns + timing.start_ns((part.y + row) as u16),
-            pixels: self.pixels(part, row),
+            pixels: cut(plane, self.row(part, row)),
         })
+    }
+}
+
+#[inline]
+fn cut(plane: Pixels<'_>, range: Range<usize>) -> Pixels<'_> {
+    match plane {
+        Pixels::U8(p) => Pixels::U8(&p[range]),
+        Pixels::U16(p) => Pixels::U16(&p[range]),
     }
 }
 

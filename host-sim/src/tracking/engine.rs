@@ -129,12 +129,12 @@ impl<'a> Engine<'a> {
         self.tracker.end_round();
     }
 
-    /// Measures every line of a frame and appends what came of it to `to`.
-    pub fn measure(&mut self, frame: &Frame, to: &mut Vec<Displacement>) -> Unmeasured {
+    /// Measures every line of a frame and hands what came of it to `take`.
+    pub fn measure(&mut self, frame: &Frame, mut take: impl FnMut(Displacement)) -> Unmeasured {
         let mut unmeasured = Unmeasured::default();
         for line in frame.lines(&self.part, &self.timing, self.rows.clone()) {
             match self.tracker.push(&line) {
-                Outcome::Measured(displacement) => to.push(displacement),
+                Outcome::Measured(displacement) => take(displacement),
                 Outcome::NoTexture | Outcome::Misfit => unmeasured.no_texture += 1,
                 Outcome::Disturbed => unmeasured.disturbed += 1,
                 Outcome::Learning => unmeasured.learning += 1,

@@ -1,7 +1,8 @@
 //! From frames to displacements, on a thread of its own.
 //!
 //! [`Shifts::start`] takes a [`Feed`] and tracks its lines; [`Shifts::next_frame`] delivers what the
-//! lines of each frame came to, in order. A tracker first learns its reference; so that nothing is
+//! lines of each frame came to, in order: row by row, or combined as they are measured, so that some
+//! samples leave the thread and not every row. A tracker first learns its reference; so that nothing is
 //! lost, the first frames are kept until it has, and then measured like all others: a clip of six frames
 //! gets the displacements of six frames. Queues are short and their buffers are used again, so memory
 //! does not grow with the length of the recording, and nothing is sent line by line.
@@ -10,7 +11,7 @@ mod background;
 mod engine;
 mod region;
 
-use rowtone::timeline::Displacement;
+use rowtone::timeline::{Binner, Displacement, Group, Sample};
 
 pub use background::subtract;
 pub use engine::{Buffers, Engine, Unmeasured};
@@ -38,11 +39,13 @@ pub struct FrameShifts {
     pub number: u32,
     /// Start of exposure of its first row, ns.
     pub start_ns: i64,
-    /// Rows that were measured, from the top of the part, the background's motion subtracted.
+    /// Rows that were measured, from the top of the part, the background's motion subtracted; none where
+    /// they are combined.
     pub rows: Vec<Displacement>,
-    /// Rows that were not.
+    /// The rows combined, where that was asked for.
+    pub samples: Vec<Sample>,
+    /// Rows that were not measured.
     pub unmeasured: Unmeasured,
-    still: Vec<Displacement>,
     /// Something to tell the user at once.
     note: Option<String>,
 }
@@ -68,11 +71,11 @@ pub struct Shifts {
 }
 
 impl Shifts {
-    /// Starts tracking.
+    /// Starts tracking. Rows are delivered one by one, or combined to samples in these groups.
     ///
     /// # Errors
     /// [`Failure`] when the part to measure cannot be measured.
-    pub fn start(feed: Feed) -> Result<Self, Failure> {
+    pub fn start(feed: Feed, groups: Option<Group>) -> Result<Self, Failure> {
         let camera = feed.camera.clone();
         let part = camera.part_or_rest()?;
         let block = if feed.frames.is_some() {
@@ -88,7 +91,7 @@ impl Shifts {
             let mut buffers = Buffers::new(&part);
             Engine::new(part, camera.timing, camera.bits, 1, &mut buffers, &name)?;
         }
-        std::thread::spawn(move || run(feed, part, outlet));
+        std::thread::spawn(move || run(feed, part, groups, outlet));
         Ok(Self {
             inlet,
             warning: None,
@@ -113,9 +116,6 @@ impl Shifts {
                 {
                     eprintln!("rowtone: {}: {note}", self.name);
                 }
-                if self.camera.background.is_some() {
-                    background::subtract(&mut frame.rows, &frame.still);
-                }
                 Ok(Some(frame))
             }
             Next::End(ending) => {
@@ -138,7 +138,7 @@ impl Shifts {
 }
 
 /// The line thread.
-fn run(mut feed: Feed, part: Rect, mut to: Outlet<FrameShifts, Ending>) {
+fn run(mut feed: Feed, part: Rect, groups: Option<Group>, mut to: Outlet<FrameShifts, Ending>) {
     let mut buffers = Buffers::new(&part);
     let mut still_buffers = feed.camera.background.as_ref().map(Buffers::new);
     let (kept, ending) = keep_first(&mut feed);
@@ -148,8 +148,12 @@ fn run(mut feed: Feed, part: Rect, mut to: Outlet<FrameShifts, Ending>) {
         false => whole.clone(),
     };
     let note = (region != whole).then(|| told(&region, &feed.camera));
-    let ending = Lines::new(feed, part, &region, &mut buffers, still_buffers.as_mut())
-        .and_then(|mut lines| lines.run(kept, ending, note, &mut to));
+    let ending = Lines::new(feed, part, &region, &mut buffers, still_buffers.as_mut()).and_then(
+        |mut lines| {
+            lines.binner = groups.map(Binner::new);
+            lines.run(kept, ending, note, &mut to)
+        },
+    );
     to.end(ending);
 }
 
@@ -191,6 +195,10 @@ struct Lines<'a> {
     feed: Feed,
     moving: Engine<'a>,
     still: Option<Engine<'a>>,
+    /// The background's rows of this frame.
+    still_rows: Vec<Displacement>,
+    /// Where rows are combined.
+    binner: Option<Binner>,
 }
 
 impl<'a> Lines<'a> {
@@ -221,6 +229,8 @@ impl<'a> Lines<'a> {
             feed,
             moving,
             still,
+            still_rows: Vec::new(),
+            binner: None,
         })
     }
 
@@ -285,11 +295,27 @@ impl<'a> Lines<'a> {
         shifts.start_ns = frame.start_ns;
         shifts.note = note;
         shifts.rows.clear();
-        shifts.still.clear();
-        shifts.unmeasured = self.moving.measure(&frame, &mut shifts.rows);
-        if let Some(still) = &mut self.still {
-            still.measure(&frame, &mut shifts.still);
+        shifts.samples.clear();
+        let (rows, samples) = (&mut shifts.rows, &mut shifts.samples);
+        match (&mut self.still, &mut self.binner) {
+            (None, Some(binner)) => {
+                let combine = |row| samples.extend(binner.push(row));
+                shifts.unmeasured = self.moving.measure(&frame, combine);
+            }
+            (still, binner) => {
+                shifts.unmeasured = self.moving.measure(&frame, |row| rows.push(row));
+                if let Some(still) = still {
+                    self.still_rows.clear();
+                    still.measure(&frame, |row| self.still_rows.push(row));
+                    background::subtract(rows, &self.still_rows);
+                }
+                if let Some(binner) = binner {
+                    samples.extend(rows.drain(..).filter_map(|row| binner.push(row)));
+                }
+            }
         }
+        // No group reaches over the end of a frame.
+        samples.extend(self.binner.as_mut().and_then(Binner::finish));
         self.feed.recycle(frame);
         to.put(shifts)
     }
