@@ -124,16 +124,16 @@ impl Recording {
         let times = Times::new(starts, Some(sensor.fps))
             .ok_or_else(|| Failure::input("the simulated recording: no frame arrives"))?;
         let feed = Feed::at_times(&args, Cursor::new(clip), times)?;
-        let mut shifts = Shifts::start(feed)?;
-        shifts.quiet = true;
         let plan = Plan::new(
-            &shifts,
+            &feed.camera,
             &Settings {
                 // More than there is: all of it is the last window.
                 window_s: 1.5 * self.truth.window_s,
                 ..Settings::default()
             },
         )?;
+        let mut shifts = Shifts::start(feed, Some(plan.groups()))?;
+        shifts.quiet = true;
         let mut memory = plan.memory();
         let mut last = None;
         Analysis::new(shifts, &plan, &mut memory)?.run(|event| {
