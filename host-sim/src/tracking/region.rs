@@ -169,18 +169,17 @@ fn look(
         }
         let bright: f32 = mean.iter().sum();
         for (frame, sums) in frames.iter().zip(sums.chunks_exact_mut(strips.len())) {
-            read(frame.pixels(part, row), &mut line);
-            let gain = line.iter().sum::<f32>() / bright.max(1.0);
+            let line_sum = read(frame.pixels(part, row), &mut line);
+            let gain = line_sum / bright.max(1.0);
             for (strip, sums) in strips.iter().zip(sums) {
-                let (mut across, mut steep, mut rest) = (0.0f32, 0.0f32, 0.0f32);
                 // The slope is not known at the picture's edge.
                 let inner = strip.start.max(1)..strip.end.min(part.width - 1);
-                for x in inner {
-                    let e = line[x] - gain * mean[x];
-                    across += slope[x] * e;
-                    steep += slope[x] * slope[x];
-                    rest += e * e;
-                }
+                let [across, steep, rest] = moments(
+                    &line[inner.clone()],
+                    &mean[inner.clone()],
+                    &slope[inner],
+                    gain,
+                );
                 sums[0] -= f64::from(across);
                 sums[1] += f64::from(steep);
                 sums[2] += f64::from(rest);
@@ -196,11 +195,34 @@ fn look(
         .collect()
 }
 
-fn read(pixels: Pixels<'_>, line: &mut [f32]) {
+/// The pixels as floats, and their sum.
+fn read(pixels: Pixels<'_>, line: &mut [f32]) -> f32 {
     match pixels {
-        Pixels::U8(p) => line.iter_mut().zip(p).for_each(|(l, &p)| *l = f32::from(p)),
-        Pixels::U16(p) => line.iter_mut().zip(p).for_each(|(l, &p)| *l = f32::from(p)),
+        Pixels::U8(p) => {
+            line.iter_mut().zip(p).for_each(|(l, &p)| *l = f32::from(p));
+            p.iter().map(|&p| u32::from(p)).sum::<u32>() as f32
+        }
+        Pixels::U16(p) => {
+            line.iter_mut().zip(p).for_each(|(l, &p)| *l = f32::from(p));
+            p.iter().map(|&p| u64::from(p)).sum::<u64>() as f32
+        }
     }
+}
+
+/// Σ slope·e, Σ slope², Σ e² of e = line − gain·mean, in several sums side by side, as vectors have them.
+fn moments(line: &[f32], mean: &[f32], slope: &[f32], gain: f32) -> [f32; 3] {
+    const LANES: usize = 8;
+    let mut sums = [[0.0f32; LANES]; 3];
+    let chunks = line.chunks(LANES).zip(mean.chunks(LANES));
+    for ((line, mean), slope) in chunks.zip(slope.chunks(LANES)) {
+        for (lane, ((&p, &r), &s)) in line.iter().zip(mean).zip(slope).enumerate() {
+            let e = p - gain * r;
+            sums[0][lane] += s * e;
+            sums[1][lane] += s * s;
+            sums[2][lane] += e * e;
+        }
+    }
+    sums.map(|lanes| lanes.iter().sum())
 }
 
 /// Sums over groups of rows and strips, weighted by their texture.
