@@ -148,7 +148,8 @@ fn line_time_s(
     let (seconds, from) = if let Some(seconds) = camera.line_time_s {
         (seconds, "the configuration".to_owned())
     } else if let Some(file) = &camera.calibration {
-        (calibrated(file)?, file.display().to_string())
+        let seconds = calibrated(file, facts.shape.height)?;
+        (seconds, file.display().to_string())
     } else if let Some((seconds, who)) = facts.line_time {
         (seconds, who.to_owned())
     } else if let Some(mode) = sensor::lookup(&facts.id, facts.shape.width, facts.shape.height) {
@@ -167,8 +168,8 @@ fn line_time_s(
     Ok(seconds)
 }
 
-/// `line_time_s` of a calibration file.
-fn calibrated(file: &Path) -> Result<f64, SetupError> {
+/// `line_time_s` of a calibration file, which must be of a picture of so many rows: another mode's is another.
+fn calibrated(file: &Path, rows: u16) -> Result<f64, SetupError> {
     let refuse = |why: String| SetupError::Calibration {
         file: file.to_owned(),
         why,
@@ -177,6 +178,14 @@ fn calibrated(file: &Path) -> Result<f64, SetupError> {
     let table: toml::Table = text
         .parse()
         .map_err(|e: toml::de::Error| refuse(e.message().to_owned()))?;
+    let its_rows = table.get("rows").and_then(toml::Value::as_integer);
+    if let Some(its_rows) = its_rows.filter(|&its_rows| its_rows != rows.into()) {
+        let why = format!(
+            "it was made with pictures of {its_rows} rows, and these have {rows}: calibrate in this mode, or give \
+             camera.mode"
+        );
+        return Err(refuse(why));
+    }
     table
         .get("line_time_s")
         .and_then(toml::Value::as_float)
@@ -259,6 +268,31 @@ mod tests {
         let deep = Config::parse("[camera]\nfull_depth = true", "f").unwrap();
         let setup = Setup::new(&facts("imx477", None), &deep, &deep.settings).unwrap();
         assert_eq!(setup.tracker.bits, 10);
+    }
+
+    #[test]
+    fn a_calibration_is_of_one_mode() {
+        let path = std::env::temp_dir().join(format!("rowtone-cal-{}.toml", std::process::id()));
+        let text = format!("[camera]\ncalibration = {path:?}");
+        let config = Config::parse(&text, "f").unwrap();
+        let setup = || Setup::new(&facts("imx477", None), &config, &config.settings);
+        std::fs::write(&path, "rows = 990\nline_time_s = 7.94e-6\n").unwrap();
+        assert_eq!(setup().unwrap().tracker.timing.line_time_ps(), 7_940_000);
+        for (text, why) in [
+            (
+                "rows = 1080\nline_time_s = 7.94e-6\n",
+                "pictures of 1080 rows",
+            ),
+            ("rows = 990\n", "no usable line_time_s"),
+            ("rows = 990\nline_time_s = nan\n", "no usable line_time_s"),
+        ] {
+            std::fs::write(&path, text).unwrap();
+            let error = setup().unwrap_err().to_string();
+            assert!(error.contains(why), "{error}");
+        }
+        std::fs::remove_file(&path).unwrap();
+        let error = setup().unwrap_err().to_string();
+        assert!(error.contains("cannot be read"), "{error}");
     }
 
     #[test]
