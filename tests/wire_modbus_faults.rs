@@ -8,119 +8,20 @@
 //! A report has a CRC-32 of its own (input register 36), so a wrong *report* takes a fault that both miss.
 //! What a harmed request changes has only the CRC-16 and the check of the settings as a whole before it.
 
+#[path = "wire_common/server.rs"]
+mod server;
 mod wire_common;
 
 use std::time::Instant;
 
-use rmodbus::{ModbusProto, client::ModbusRequest};
-use rowtone::link::Link;
-use rowtone::outbox::Outbox;
 use rowtone::report::Report;
-use rowtone::settings::store::{Nowhere, Started};
-use rowtone::settings::{Board, Console, Limits, Settings, Wire};
-use rowtone::wire::SettingsOrigin;
+use rowtone::settings::Wire;
 use rowtone::wire::modbus::decode_report;
+use server::{Server, UNIT, read_holdings, read_inputs, registers, request};
 use wire_common::{Dice, harm, ordinary_report};
-
-const UNIT: u8 = 9;
 
 /// Bytes harmed, of all bytes.
 const RATES: [f64; 4] = [1e-5, 1e-4, 1e-3, 1e-2];
-
-/// Long enough a silence at any speed used here, µs.
-const SILENCE_US: u64 = 10_000;
-
-/// A board's end of a line, and the time.
-struct Server<'a> {
-    link: Link<'a>,
-    now_us: u64,
-    byte_us: u64,
-}
-
-impl<'a> Server<'a> {
-    fn new(slots: &'a mut [Option<Report>], baud: u32) -> Self {
-        let limits = Limits {
-            width: 320,
-            height: 240,
-            min_width: 16,
-            max_window_s: 10.0,
-        };
-        let defaults = Settings {
-            unit: UNIT,
-            wire: Wire::Modbus,
-            ..Settings::default()
-        };
-        let board = Board {
-            version: [1, 2, 3],
-            limits,
-            defaults,
-        };
-        let started = Started {
-            session: 7,
-            settings: None,
-            origin: SettingsOrigin::Defaults,
-        };
-        Self {
-            link: Link::new(
-                Console::new(board, started).unwrap(),
-                Outbox::new(slots),
-                baud,
-            ),
-            now_us: 0,
-            byte_us: 11_000_000 / u64::from(baud),
-        }
-    }
-
-    fn hear(&mut self, bytes: &[u8]) {
-        for &byte in bytes {
-            self.now_us += self.byte_us;
-            self.link.receive(byte, self.now_us, &mut Nowhere);
-        }
-    }
-
-    /// What the board says after a pause.
-    fn after(&mut self, pause_us: u64) -> Vec<u8> {
-        self.now_us += pause_us;
-        let said = self.link.poll(self.now_us, &mut Nowhere).to_vec();
-        self.link.sent(said.len());
-        said
-    }
-
-    fn ask(&mut self, request: &[u8]) -> Vec<u8> {
-        self.hear(request);
-        self.after(SILENCE_US)
-    }
-
-    fn settings(&self) -> Settings {
-        *self.link.console().settings()
-    }
-}
-
-fn client() -> ModbusRequest {
-    ModbusRequest::new(UNIT, ModbusProto::Rtu)
-}
-
-/// A request of the client, and the client that takes its answer.
-fn request(of: impl FnOnce(&mut ModbusRequest, &mut Vec<u8>)) -> (ModbusRequest, Vec<u8>) {
-    let (mut client, mut frame) = (client(), vec![]);
-    of(&mut client, &mut frame);
-    (client, frame)
-}
-
-fn read_inputs(at: u16, count: u16) -> (ModbusRequest, Vec<u8>) {
-    request(|client, frame| client.generate_get_inputs(at, count, frame).unwrap())
-}
-
-fn read_holdings() -> (ModbusRequest, Vec<u8>) {
-    request(|client, frame| client.generate_get_holdings(0, 20, frame).unwrap())
-}
-
-/// The registers in an answer, if the client accepts it and they are as many as were asked for.
-fn registers(client: &ModbusRequest, answer: &[u8], count: u16) -> Option<Vec<u16>> {
-    let mut values = vec![];
-    client.parse_u16(answer, &mut values).ok()?;
-    (values.len() == usize::from(count)).then_some(values)
-}
 
 /// What a line does to a frame: bytes harmed at a rate, and at times garbage before it or the cable
 /// pulled in the middle. At least one thing happens.
@@ -350,111 +251,4 @@ fn ten_million_harmed_requests() {
     let requests = run_requests(10_000_000, 4);
     println!("{requests:?} in {:.0} s", start.elapsed().as_secs_f32());
     check_requests(&requests);
-}
-
-/// A frame ends with 3.5 characters of silence, and only there.
-#[test]
-fn silences_part_frames() {
-    for (baud, short_us, long_us) in [(115_200, 1_000, 1_800), (9600, 3_000, 4_100)] {
-        let mut slots = [const { None }; 4];
-        let mut server = Server::new(&mut slots, baud);
-        let (client, frame) = read_inputs(0, 4);
-        let right = |answer: &[u8]| registers(&client, answer, 4) == Some(vec![1, 1, 2, 3]);
-
-        server.hear(&frame);
-        assert!(
-            server.after(short_us).is_empty(),
-            "{baud}: it may go on yet"
-        );
-        assert!(right(&server.after(long_us - short_us)));
-
-        // A pause within a frame.
-        for (pause_us, answered) in [(short_us, true), (long_us, false)] {
-            server.hear(&frame[..3]);
-            assert!(server.after(pause_us).is_empty());
-            server.hear(&frame[3..]);
-            assert_eq!(right(&server.after(SILENCE_US)), answered, "{baud}");
-        }
-
-        // Garbage when the cable is plugged in: alone, and with a request right behind it.
-        server.hear(&[0, 0xff, 0x55]);
-        assert!(server.after(long_us).is_empty());
-        assert!(right(&server.ask(&frame)));
-        server.hear(&[0xff; 7]);
-        assert!(server.ask(&frame).is_empty());
-        assert!(right(&server.ask(&frame)));
-
-        // More than a frame holds, and a request cut short by the pulled cable.
-        assert!(server.ask(&[UNIT; 300]).is_empty());
-        assert!(right(&server.ask(&frame)));
-        assert!(server.ask(&frame[..5]).is_empty());
-        assert!(right(&server.ask(&frame)));
-
-        // Two requests of which the board heard the first too late to answer.
-        server.hear(&frame);
-        server.now_us += SILENCE_US;
-        assert!(right(&server.ask(&frame)));
-        assert!(server.after(SILENCE_US).is_empty());
-    }
-}
-
-/// Other units on the same two wires, and their answers.
-#[test]
-fn others_on_the_bus_do_not_matter() {
-    let mut slots = [const { None }; 4];
-    let mut server = Server::new(&mut slots, 19_200);
-    let (client, frame) = read_inputs(0, 4);
-    let mut other = ModbusRequest::new(UNIT + 1, ModbusProto::Rtu);
-    let mut to_other = vec![];
-    other.generate_get_inputs(0, 4, &mut to_other).unwrap();
-    let mut answer = vec![UNIT + 1, 4, 8, 0, 1, 0, 2, 0, 3, 0, 4];
-    let crc = crc::Crc::<u16>::new(&crc::CRC_16_MODBUS).checksum(&answer);
-    answer.extend(crc.to_le_bytes());
-    for _ in 0..3 {
-        assert!(server.ask(&to_other).is_empty());
-        assert!(server.ask(&answer).is_empty());
-        assert!(registers(&client, &server.ask(&frame), 4).is_some());
-    }
-}
-
-/// Reports that a PLC never reads are not dropped reports: the newest is what it wants.
-#[test]
-fn nothing_counts_as_dropped() {
-    let mut slots = [const { None }; 4];
-    let mut server = Server::new(&mut slots, 115_200);
-    (0..10).for_each(|seq| server.link.push(ordinary_report(seq)));
-    let (client, frame) = read_inputs(10, 8);
-    let heard = registers(&client, &server.ask(&frame), 8).unwrap();
-    // Next number 10, dropped 0, refused 0, newest 9.
-    assert_eq!(heard, [0, 10, 0, 0, 0, 0, 0, 9]);
-}
-
-/// The report's own checksum tells a fault that a frame's CRC-16 would miss, and registers of two reports.
-#[test]
-fn a_report_is_whole_or_none() {
-    let map = |seq: u32| -> Vec<Option<u16>> {
-        let mut slots = [const { None }; 4];
-        let mut server = Server::new(&mut slots, 115_200);
-        (0..=seq).for_each(|seq| server.link.push(ordinary_report(seq)));
-        let mut map = vec![None; 420];
-        for (at, count) in [(0, 38), (100, 80)] {
-            let (client, frame) = read_inputs(at, count);
-            let values = registers(&client, &server.ask(&frame), count).unwrap();
-            for (slot, value) in map[usize::from(at)..].iter_mut().zip(values) {
-                *slot = Some(value);
-            }
-        }
-        map
-    };
-    let decode = |map: &[Option<u16>]| decode_report(|at| *map.get(usize::from(at))?);
-    let map = map(3);
-    assert_eq!(decode(&map), Some(ordinary_report(3)));
-    for at in (4..6).chain([8]).chain(16..38).chain(100..160) {
-        for bit in 0..16 {
-            let mut harmed = map.clone();
-            harmed[at] = harmed[at].map(|value| value ^ 1 << bit);
-            // The third flag of a peak says that it is there; without it there are fewer peaks.
-            assert_eq!(decode(&harmed), None, "register {at}, bit {bit}");
-        }
-    }
 }

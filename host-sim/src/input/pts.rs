@@ -44,7 +44,8 @@ pub fn parse(text: &str) -> Result<Vec<i64>, String> {
         let milliseconds: f64 = line
             .parse()
             .ok()
-            .filter(|ms: &f64| ms.abs() < 9e12)
+            // 126 years either way, so that the time between any two fits as well.
+            .filter(|ms: &f64| ms.abs() < 4e12)
             .ok_or_else(|| format!("line {number}: {line:?} is not a time in milliseconds"))?;
         let time = (milliseconds * 1e6).round() as i64;
         if times.last().is_some_and(|&before| time <= before) {
@@ -82,6 +83,7 @@ mod tests {
             ("0\n\n-1\n", "line 3"),
             ("0\nNaN\n", "line 2"),
             ("0\ninf\n", "line 2"),
+            ("-8e12\n8e12\n", "line 1"),
             ("# timecode format v1\n0\n", "line 1"),
             ("# timecode format v2\n", "no time"),
         ] {
