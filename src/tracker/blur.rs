@@ -77,13 +77,6 @@ impl Blur {
         };
     }
 
-    /// Rows that know so much of their shift tell the smear. Of three rows the speed has 6.5 times their
-    /// variance, and over a long exposure its error alone would look like a smear that changes the shift.
-    fn is_told_by(&self, information: f32) -> bool {
-        let exposure2 = self.exposure_rows * self.exposure_rows;
-        6.5 * exposure2 / 12.0 < Self::LEAST_PX2 * information
-    }
-
     /// Takes the speed and the acceleration of a row.
     fn add(&mut self, speed_px: f32, change_px: f32) {
         self.speed2 += (speed_px * speed_px - self.speed2) / Self::MEMORY_ROWS;
@@ -130,9 +123,6 @@ impl Tracker<'_> {
         shift_px: f32,
     ) -> f32 {
         let information = table.information_per_px2();
-        if !self.blur.is_told_by(information) {
-            return shift_px;
-        }
         let (speed_px, change_px) = self.prediction.motion(row, shift_px, information);
         self.blur.add(speed_px, change_px);
         let path = self.blur.path(speed_px, change_px);
