@@ -88,7 +88,7 @@ impl<'a> Analyzer<'a> {
         self.reporter.passes()
     }
 
-    /// Samples dropped so far: they knew nothing, came late, or were of no slot.
+    /// Samples dropped so far: they knew nothing, came late, were of no slot, or lacked rows that their slot has as a rule.
     pub const fn dropped_samples(&self) -> u32 {
         self.collector.dropped_samples()
     }

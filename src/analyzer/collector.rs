@@ -232,6 +232,13 @@ impl<'a> Collector<'a> {
         let column = self.column(self.held - 1);
         let at = usize::from(sample.slot) * self.capacity + column;
         let ring = &mut self.ring;
+        if let Some(spread) = ring.spread.get_mut(usize::from(sample.slot)) {
+            let first = self.held == 1 || *spread == Spread::default();
+            if !follow_spread(spread, sample.spread, first, &self.group.even_spread()) {
+                self.dropped_samples = self.dropped_samples.saturating_add(1);
+                return;
+            }
+        }
         if let (Some(x), Some(w), Some(d)) = (
             ring.shift_px.get_mut(at),
             ring.weight.get_mut(at),
@@ -240,10 +247,6 @@ impl<'a> Collector<'a> {
             *x = sample.shift_px;
             *w = pack_weight(sample.information_per_px2);
             *d = skew_of(&self.group, &sample, newest.start_ns);
-        }
-        if let Some(spread) = ring.spread.get_mut(usize::from(sample.slot)) {
-            let first = self.held == 1 || *spread == Spread::default();
-            follow_spread(spread, sample.spread, first);
         }
     }
 

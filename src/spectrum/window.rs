@@ -67,10 +67,17 @@ pub(crate) fn skew_unit_ns(group: &Group) -> i64 {
 
 /// How fast a slot's spread follows what its samples say, as a share a frame: rows that something passes
 /// before are not the slot's.
-const FOLLOW: f32 = 0.125;
+const FOLLOW: f32 = 0.25;
 
-/// What is known of a slot's spread after one more sample; what is no spread changes nothing.
-pub(crate) fn follow_spread(known: &mut Spread, now: Spread, first: bool) {
+/// A sample whose variance is off its slot's by more than this share of an even one's lacks rows that others have.
+const RAGGED: f32 = 0.15;
+
+/// What is known of a slot's spread after one more sample; what is no spread changes nothing. Says whether the sample is
+/// like the slot's others: one that lacks rows sees a fast tone at another size and time, which looks like tones
+/// beside it.
+pub(crate) fn follow_spread(known: &mut Spread, now: Spread, first: bool, even: &Spread) -> bool {
+    let off = (now.variance_ns2 - known.variance_ns2).abs();
+    let usual = first || off <= RAGGED * even.variance_ns2;
     let share = if first { 1.0 } else { FOLLOW };
     let variance = known.variance_ns2 + share * (now.variance_ns2 - known.variance_ns2);
     let third = known.third_ns3 + share * (now.third_ns3 - known.third_ns3);
@@ -80,6 +87,7 @@ pub(crate) fn follow_spread(known: &mut Spread, now: Spread, first: bool) {
             third_ns3: third,
         };
     }
+    usual
 }
 
 /// A sample's time beyond that of its frame and slot, in skew units; saturates.
