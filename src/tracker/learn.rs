@@ -99,8 +99,7 @@ impl Tracker<'_> {
             }
             Stage::Tracking => {}
         }
-        self.prediction
-            .end_round(self.usual_information(), self.range_px);
+        self.prediction.end_round(self.usual_information());
         self.blur.end_round();
         self.meter = NoiseMeter::default();
         self.range_px = 0.0;
@@ -120,6 +119,7 @@ impl Tracker<'_> {
                 information_per_px2,
             } if information_per_px2 > OWN_INFORMATION_PER_PX2 => {
                 textured = true;
+                self.prediction.note_extent(shift_px, information_per_px2);
                 shift_px
             }
             Found::At { .. } | Found::NoTexture => self.prediction.at(row),

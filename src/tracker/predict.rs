@@ -18,6 +18,10 @@ pub(super) struct Prediction {
     change_px: f32,
     /// Rows added since nothing was known, up to 3.
     known: u8,
+    /// Σ information·shift² and Σ information of this round of learning: single rows that know little may
+    /// be anywhere.
+    extent: f32,
+    extent_information: f32,
     /// The last round's motion went further than one inner product reaches.
     far: bool,
     /// Information of a row with texture, the mean over all, 1/px²; 0 until that is known.
@@ -39,10 +43,12 @@ impl Prediction {
     /// A row that is further from where it was expected makes the motion swift, px²: one inner product
     /// would not do any more.
     const SWIFT_PX2: f32 = 0.5;
-    /// Motion that goes no further than this is found from anywhere within it, px.
-    const SMALL_PX: f32 = 2.0;
+    /// A motion of this root mean square is found from anywhere within it, px.
+    const SMALL_PX: f32 = 0.7;
     /// No row's place is surer than this against its neighbour's, 1/px²: their references are not.
     const MOST_INFORMATION: f32 = 1e4;
+    /// Information of a tenth of a pixel, 1/px².
+    const SURE: f32 = 100.0;
     /// For so many frames.
     const SWIFT_FRAMES: u8 = 64;
     /// Over more rows than this the speed tells nothing.
@@ -94,7 +100,7 @@ impl Prediction {
 
     /// It is sure to about a tenth of a pixel.
     pub(super) fn is_sure(&self) -> bool {
-        self.information > 100.0
+        self.information > Self::SURE
     }
 
     /// Takes what a row came to.
@@ -118,7 +124,9 @@ impl Prediction {
         let expected = self.at(row);
         let surprise = shift_px - expected;
         let square = surprise * surprise;
-        if square > Self::SWIFT_PX2 && square * information > 36.0 {
+        // A row that knows little may be anywhere.
+        let least = (0.25 * self.usual_information).max(Self::SURE);
+        if square > Self::SWIFT_PX2 && information > least {
             self.swift_frames = Self::SWIFT_FRAMES;
         }
         if self.gap.is_open() {
@@ -182,12 +190,19 @@ impl Prediction {
         self.row = 0;
     }
 
+    /// While learning: a row was at `shift_px`.
+    pub(super) fn note_extent(&mut self, shift_px: f32, information: f32) {
+        self.extent += information * shift_px * shift_px;
+        self.extent_information += information;
+    }
+
     /// A round of learning has ended: what is known of the motion stays, where the picture is does not.
-    /// `usual_information`: of a row with texture, 1/px²; `range_px`: how far the motion went.
-    pub(super) fn end_round(&mut self, usual_information: f32, range_px: f32) {
+    /// `usual_information`: of a row with texture, 1/px².
+    pub(super) fn end_round(&mut self, usual_information: f32) {
         self.forget();
         self.gap.end_round();
-        self.far = range_px > Self::SMALL_PX;
+        self.far = self.extent > Self::SMALL_PX * Self::SMALL_PX * self.extent_information;
+        (self.extent, self.extent_information) = (0.0, 0.0);
         self.usual_information = usual_information;
         self.shift_px = self.gap.expected_px();
     }
