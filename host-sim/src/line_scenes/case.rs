@@ -107,9 +107,36 @@ fn usual(seed: u64, name: &str, tones: Vec<Tone>, seconds: f64) -> Case {
     }
 }
 
+/// 8 px peak to peak where it is hardest: fast, exposed for long, on stripes.
+fn swift(seed: u64) -> Vec<Case> {
+    let stripes = |period_px| Scene::Stripes { period_px };
+    let speckle = Scene::Speckle { grain_px: 2.0 };
+    let mut cases = Vec::new();
+    let mut add = |name: &str, hz: f64, scene: Scene, exposure_ns: u32| {
+        let name = format!("8 px p-p at {hz} Hz, {name}");
+        let mut case = usual(seed, &name, vec![tone(hz, 4.0)], 1.0);
+        case.config.scene = scene;
+        case.config.sensor.exposure_ns = exposure_ns;
+        cases.push(case);
+    };
+    for hz in [7.7, 33.1, 119.3, 301.7] {
+        add("stripes", hz, stripes(16.0), 200_000);
+    }
+    for period_px in [12.0, 10.0] {
+        let name = format!("{period_px} px stripes");
+        add(&name, 50.3, stripes(period_px), 200_000);
+    }
+    for (name, scene) in scenes().into_iter().skip(1) {
+        add(name, 1003.0, scene, 200_000);
+    }
+    add("0.1 ms", 1003.0, speckle.clone(), 100_000);
+    add("0.3 ms", 1003.0, speckle, 300_000);
+    cases
+}
+
 /// What an estimator may be fooled by.
 pub fn hard(seed: u64) -> Vec<Case> {
-    let mut cases = Vec::new();
+    let mut cases = swift(seed);
     for hz in [5.3, 50.3, 203.7, 1003.0] {
         let name = format!("8 px p-p at {hz} Hz + 0.03 px");
         let tones = vec![tone(hz, 4.0), tone(77.7, 0.03)];

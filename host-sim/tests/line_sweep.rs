@@ -1,0 +1,47 @@
+//! The line engine's table of figures, on a smaller grid than `rowtone sweep lines` prints, kept as it is.
+//!
+//! A changed digit is a changed engine: look at it with the full table, then keep the new one. The digits are
+//! few, so that another machine's rounding does not show.
+
+use host_sim::line_scenes::case::{Case, hard, small_motion};
+use host_sim::line_scenes::measure::measure;
+
+/// Presets with a long and a short line time, every scene.
+fn small() -> Vec<Case> {
+    let mut cases = small_motion(11, 16, 10);
+    cases.retain(|c| ["ov5647", "imx708", "hm01b0"].contains(&c.name.split(' ').next().unwrap()));
+    cases
+}
+
+/// Large and fast motion, and a hand, on half of the picture's columns and 0.4 s.
+fn large() -> Vec<Case> {
+    let wanted = ["1003 Hz +", "50.3 Hz, stripes", "30 px", "hand"];
+    let mut cases = hard(11);
+    cases.retain(|c| wanted.iter().any(|wanted| c.name.contains(wanted)));
+    for case in &mut cases {
+        case.config.sensor.cols = 128;
+        if !case.name.contains("hand") {
+            case.config.frames = 44;
+        }
+        case.peaks = false;
+    }
+    cases
+}
+
+#[test]
+fn the_small_table_is_as_it_was() {
+    let mut table = String::new();
+    for case in small().iter().chain(&large()) {
+        let f = measure(case).expect("a case that can be measured");
+        table += &format!(
+            "{:<32} {:>4.1} of the bound, amplitude {:+.0} %, {:.0} % blank, {:.0} % disturbed\n",
+            case.name,
+            f.to_bound,
+            // No sign of nothing.
+            (100.0 * f.amplitude_error).round() + 0.0,
+            100.0 * f.no_texture,
+            100.0 * f.disturbed,
+        );
+    }
+    assert_eq!(table, include_str!("line_sweep.txt"), "now:\n{table}");
+}
