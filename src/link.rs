@@ -73,6 +73,11 @@ impl<'a> Link<'a> {
         &self.console
     }
 
+    /// As [`Console::set_picture`].
+    pub fn set_picture(&mut self, width: u16, height: u16) {
+        self.console.set_picture(width, height);
+    }
+
     /// The reports kept.
     pub fn outbox(&self) -> &Outbox<'a> {
         &self.outbox

@@ -101,6 +101,13 @@ impl Console {
         &self.board
     }
 
+    /// Tells the size of the picture, for a board that knows its camera only later: from now on regions
+    /// are checked against it. Settings that are in use stay.
+    pub fn set_picture(&mut self, width: u16, height: u16) {
+        self.board.limits.width = width;
+        self.board.limits.height = height;
+    }
+
     /// Number of the session, as every report carries it.
     pub fn session(&self) -> u32 {
         self.session

@@ -88,6 +88,7 @@ pub fn run(config: &Config, shared: &Shared, open: &mut Open<'_>) -> Result<(), 
     let (keeper, started) = Keeper::open(config);
     let board = Board {
         version: version(),
+        // What the core can take; the line learns the picture's size when the camera is open.
         limits: Limits {
             width: 8192,
             height: u16::MAX,
@@ -185,13 +186,15 @@ fn sessions(
     notifier: &Notifier,
 ) -> Result<u64, String> {
     let mut measured = 0;
+    let shape = source.facts().shape;
+    shared.set_picture(shape.width, shape.height);
     loop {
         let settings = shared.settings();
         let whole = Settings {
             roi: None,
             ..settings
         };
-        // A host may ask for a region that this camera has not got: better measure all than nothing.
+        // A region that was saved or configured for another camera: better measure all than nothing.
         let setup = Setup::new(source.facts(), config, &settings).or_else(|e| {
             log(&format!("{e}; the whole picture is used"));
             Setup::new(source.facts(), config, &whole)

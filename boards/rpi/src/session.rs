@@ -32,6 +32,8 @@ pub struct Shared {
     pub changes: AtomicU32,
     /// What is measured now.
     pub settings: Mutex<Settings>,
+    /// Columns and rows of the camera's picture, in the upper and the lower half; 0 until one is open.
+    picture: AtomicU32,
     /// Windows dropped because the spectrum was busy, and reports because the queue was full.
     pub dropped: AtomicU64,
     /// When the program began.
@@ -45,6 +47,7 @@ impl Shared {
             stop: AtomicBool::new(false),
             changes: AtomicU32::new(0),
             settings: Mutex::new(settings),
+            picture: AtomicU32::new(0),
             dropped: AtomicU64::new(0),
             started: Instant::now(),
         }
@@ -53,6 +56,18 @@ impl Shared {
     /// The settings in use.
     pub fn settings(&self) -> Settings {
         *self.settings.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The camera is open, and its picture has this size.
+    pub fn set_picture(&self, width: u16, height: u16) {
+        let picture = u32::from(width) << 16 | u32::from(height);
+        self.picture.store(picture, Ordering::Relaxed);
+    }
+
+    /// Columns and rows of the camera's picture; none before the first one was opened.
+    pub fn picture(&self) -> Option<(u16, u16)> {
+        let picture = self.picture.load(Ordering::Relaxed);
+        (picture != 0).then_some(((picture >> 16) as u16, picture as u16))
     }
 
     /// The program is to end.

@@ -158,6 +158,9 @@ impl<K: Keep> Uart<'_, K> {
     fn serve(&mut self, port: &mut Port, shared: &Shared) -> io::Result<bool> {
         let mut bytes = [0; 256];
         let count = port.read(&mut bytes)?;
+        if let Some((width, height)) = shared.picture() {
+            self.link.set_picture(width, height);
+        }
         for &byte in bytes.get(..count).unwrap_or_default() {
             self.link.receive(byte, now_us(shared), &mut self.store);
         }

@@ -299,6 +299,12 @@ fn settings_over_the_line_change_what_is_measured_and_the_last_report_is_sent() 
         );
         let last = reports(&heard).pop().unwrap();
         assert_eq!(last.peaks.len(), 1);
+        ours.write_all(b"set roi 10,10,151,10\n").unwrap();
+        let heard = listen(&mut ours, |m| matches!(m, Message::Reply(_)));
+        let Some(Message::Reply(reply)) = heard.last() else {
+            panic!("{heard:?}");
+        };
+        assert!(!reply.ok && reply.text.contains("160"), "{reply:?}");
         std::thread::sleep(Duration::from_millis(200));
         shared.stop.store(true, Ordering::Relaxed);
         let after = listen(&mut ours, |m| matches!(m, Message::Report { .. }));
