@@ -258,15 +258,17 @@ impl<'a> Tracker<'a> {
         if self.frame != Some(line.frame) {
             self.next_frame(line.frame, line.start_ns);
         }
-        if self.stage != Stage::Tracking {
-            self.locate_and_learn(row, pixels);
-            return Outcome::Learning;
-        }
         let mut aside_px = 0.0;
-        if self.beside {
+        if self.beside && self.stage == Stage::Tracking {
             aside_px = self.work_beside::<P>(row);
         }
-        match self.locate(row, pixels, aside_px) {
+        let found = self.locate(row, pixels, aside_px);
+        if self.stage != Stage::Tracking {
+            self.counts.learning = self.counts.learning.wrapping_add(1);
+            self.learn(row, pixels, found);
+            return Outcome::Learning;
+        }
+        match found {
             Found::NoTexture => {
                 self.counts.no_texture = self.counts.no_texture.wrapping_add(1);
                 Outcome::NoTexture
@@ -289,14 +291,6 @@ impl<'a> Tracker<'a> {
                 })
             }
         }
-    }
-
-    #[cold]
-    #[inline(never)]
-    fn locate_and_learn<P: Pixel>(&mut self, row: usize, pixels: &[P]) {
-        self.counts.learning = self.counts.learning.wrapping_add(1);
-        let found = self.locate(row, pixels, 0.0);
-        self.learn(row, pixels, found);
     }
 
     /// What a line may need is bounded: not while learning, which cannot be done in a line time.

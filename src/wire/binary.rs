@@ -23,6 +23,9 @@ use heapless::Vec;
 use postcard::ser_flavors::{Cobs, Slice, crc::CrcModifier};
 
 use super::check::{CRC_32, EncodeError, check_message};
+
+/// The same sum in the form that postcard takes, which is always by a table.
+static POSTCARDS_CRC_32: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
 use super::message::Message;
 
 /// First byte of every frame before stuffing. It changes when the order of a message's fields does.
@@ -88,7 +91,7 @@ pub fn encode_to_slice<'a>(
     let full = |_| EncodeError::Full;
     let flavor = CrcModifier::new(
         Cobs::try_new(Slice::new(stuffed)).map_err(full)?,
-        CRC_32.digest(),
+        POSTCARDS_CRC_32.digest(),
     );
     let used = postcard::serialize_with_flavor(&(FORMAT, message), flavor).map_err(full)?;
     let end = used.len().saturating_add(1);

@@ -3,7 +3,7 @@
 use core::fmt::{self, Write};
 
 use crate::report::{Peak, Report};
-use crate::wire::check::{EncodeError, check_message};
+use crate::wire::check::{Digest, EncodeError, check_message};
 use crate::wire::message::{Message, SettingsOrigin, Status};
 use crate::wire::{decimal, slice::SliceWriter};
 
@@ -119,7 +119,7 @@ fn optional(out: &mut impl Write, value: Option<f32>, decimals: u32) -> fmt::Res
 /// Passes text on and sums it up.
 struct Summed<'a, W> {
     out: &'a mut W,
-    digest: crc::Digest<'static, u32>,
+    digest: Digest,
 }
 
 impl<W: Write> Write for Summed<'_, W> {

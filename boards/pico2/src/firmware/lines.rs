@@ -8,7 +8,7 @@ use core::sync::atomic::Ordering;
 use rowtone::camera::{Line, Pixels};
 use rowtone::settings::Region;
 use rowtone::timeline::{Binner, Sample};
-use rowtone::tracker::{Outcome, Stage, Tracker};
+use rowtone::tracker::{Stage, Tracker};
 use rowtone_pico2::capture::LINE_PIXELS;
 use rowtone_pico2::handover::{LineBuffer, Taker, count};
 use rowtone_pico2::plan::Plan;
@@ -99,8 +99,5 @@ fn measure(
         start_ns,
         pixels: Pixels::U8(pixels),
     };
-    match tracker.push(&line) {
-        Outcome::Measured(displacement) => binner.push(displacement),
-        _ => None,
-    }
+    tracker.push_into(&line, binner)
 }
