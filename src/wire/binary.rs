@@ -23,10 +23,10 @@ use heapless::Vec;
 use postcard::ser_flavors::{Cobs, Slice, crc::CrcModifier};
 
 use super::check::{CRC_32, EncodeError, check_message};
+use super::message::Message;
 
 /// The same sum in the form that postcard takes, which is always by a table.
 static POSTCARDS_CRC_32: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
-use super::message::Message;
 
 /// First byte of every frame before stuffing. It changes when the order of a message's fields does.
 pub const FORMAT: u8 = 1;
