@@ -184,8 +184,34 @@ fn stripes_that_stand_still_are_measured_all_the_same() {
     assert_eq!(c.blank_s, None);
 }
 
+/// Twelve frames: what moves between them is noise, and must not be taken for stripes (it was, with a shorter picture).
 #[test]
-#[ignore = "not reached: with a tenth of the flashes missing, calibration refuses (it takes them for a subharmonic)"]
+fn noise_about_still_stripes_is_no_stripes() {
+    for seed in 0..6 {
+        Scene {
+            fps: 25.0,
+            rows: 200,
+            exposure_s: 300e-6,
+            noise: 1.0,
+            seed: 700 + seed,
+            ..Scene::default()
+        }
+        .expect_right(3e-4);
+    }
+}
+
+/// A third of a period a frame: each row sees the stripes in three places only.
+#[test]
+fn stripes_that_come_back_to_three_places_are_measured_all_the_same() {
+    let c = Scene {
+        fps: 30.0,
+        ..Scene::default()
+    }
+    .expect_right(2e-4);
+    assert!(c.blank_s.is_some(), "{c:?}");
+}
+
+#[test]
 fn missing_flashes_are_left_out_and_counted() {
     let c = Scene {
         missing: 100,
@@ -238,6 +264,12 @@ fn what_cannot_be_right_is_refused() {
         calibrate(&video, light(1100.0)),
         Err(Refusal::FramePhase { .. })
     ));
+    // One of half the frequency: the line time would be twice as long, and still fit into the frame.
+    let video = Scene::default().recording();
+    assert!(matches!(
+        calibrate(&video, light(500.0)),
+        Err(Refusal::FramePhase { .. })
+    ));
     // Noise, and nothing else.
     let dark = Scene {
         duty: 0.0,
@@ -277,7 +309,7 @@ fn what_cannot_be_right_is_refused() {
 /// 40 seeds; the rms of error over stated standard deviation lies within 0.8 to 1.2. Were it truly 1, chance would
 /// leave that band about once in 14 times; the seeds are fixed, so this run always says the same.
 #[test]
-#[ignore = "not reached: over ten frames the errors are 1.205 times what is stated; 1.2 is asked for"]
+#[ignore = "not reached: over ten frames the errors are 1.284 times what is stated; 1.2 is asked for"]
 fn the_stated_standard_deviation_is_right() {
     const SEEDS: u64 = 40;
     for (frames, rows) in [(10, 128), (1, 300)] {

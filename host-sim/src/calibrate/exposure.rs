@@ -2,14 +2,18 @@
 //!
 //! A light that is switched, averaged over the exposure, is a trapezoid: its ramps last as long as the exposure,
 //! as long as that is shorter than both the bright and the dark part. All frames are folded by phase and a
-//! trapezoid is fitted. Where the light never shows fully dark or fully bright the exposure cannot be told from
-//! the light's own on-time, and nothing is said.
+//! trapezoid is fitted, bent by a tone curve: pictures are seldom linear in the light. Where the light never shows
+//! fully dark or fully bright the exposure cannot be told from the light's own on-time, and nothing is said.
 
 use super::fit::Fit;
+use super::simplex::minimum;
 use crate::linear::median;
 
 /// Bins that one period is folded into.
 const BINS: usize = 512;
+
+/// Exponents of the tone curve that are believed: a camera that writes linear values has 1.
+const TONES: std::ops::RangeInclusive<f64> = 0.4..=2.5;
 
 /// Exposure in periods of the light, and its standard deviation.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,25 +26,73 @@ pub struct Ramp {
     pub duty: f64,
 }
 
+/// Phase of the rise, duty, width of the ramps, and the tone curve 1 − (1 − xᵃ)ᵇ: its a and b.
+type Shape = [f64; 5];
+
+/// Mean and count of the values in a bin.
+type Bins = [(f64, f64)];
+
 /// Fits the trapezoid; `None` where it does not determine the exposure.
+///
+/// With b fixed at 1 (a power law) and with both exponents free; the two widths differ by what the unknown tone curve
+/// is good for, and that goes into the standard deviation.
 pub fn ramp(rows: &[Vec<f64>], fit: &Fit) -> Option<Ramp> {
     let bins = fold(rows, fit);
-    let cost = |p: &[f64; 3]| trapezoid_cost(&bins, p).0;
-    let mut best = ([0.0; 3], f64::INFINITY);
-    for phase in 0..16 {
-        for duty in [0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9] {
-            for width in [0.02, 0.06, 0.15, 0.3, 0.45] {
-                let p = [phase as f64 / 16.0, duty, width];
-                let c = cost(&p);
+    let start = first_guess(&bins);
+    let [power, free] = [0.0, 5.0].map(|b| fit_shape(&bins, fit, start, b));
+    let (power, free) = (power?, free?);
+    Some(Ramp {
+        periods: 0.5 * (power.periods + free.periods),
+        sd: power
+            .sd
+            .max(free.sd)
+            .hypot(0.5 * (power.periods - free.periods)),
+        duty: free.duty,
+    })
+}
+
+/// The best of a grid, over coarse bins.
+fn first_guess(bins: &Bins) -> Shape {
+    let coarse: Vec<(f64, f64)> = bins
+        .chunks(4)
+        .map(|four| {
+            let count: f64 = four.iter().map(|b| b.1).sum();
+            let sum: f64 = four.iter().map(|b| b.0 * b.1).sum();
+            (sum / count.max(1.0), count)
+        })
+        .collect();
+    let mut best = ([0.0; 5], f64::INFINITY);
+    for phase in 0..32 {
+        for duty in 1..20 {
+            for width in [0.01, 0.03, 0.06, 0.1, 0.15, 0.22, 0.3, 0.4] {
+                let p = [
+                    f64::from(phase) / 32.0,
+                    f64::from(duty) / 20.0,
+                    width,
+                    1.0,
+                    1.0,
+                ];
+                let c = trapezoid_cost(&coarse, &p).0;
                 if c < best.1 {
                     best = (p, c);
                 }
             }
         }
     }
-    let found = nelder_mead(cost, best.0, [0.03, 0.05, 0.03]);
-    let [_, duty, width] = found;
-    let (rss, levels) = trapezoid_cost(&bins, &found);
+    best.0
+}
+
+/// From `start`; `shoulder` is the simplex's size along b, in units of that along the phase.
+fn fit_shape(bins: &Bins, fit: &Fit, start: Shape, shoulder: f64) -> Option<Ramp> {
+    let cost = |p: &Shape| trapezoid_cost(bins, p).0;
+    let mut found = start;
+    // A simplex may flatten out on the way; started again it does not.
+    for size in [0.03, 0.01, 0.003] {
+        let sides = [1.0, 1.0, 1.0, 5.0, shoulder].map(|s| s * size);
+        found = minimum(cost, found, sides);
+    }
+    let [_, duty, width, _, _] = found;
+    let (rss, levels) = trapezoid_cost(bins, &found);
     if !(0.0..1.0).contains(&duty) || width <= 0.0 {
         return None;
     }
@@ -55,26 +107,24 @@ pub fn ramp(rows: &[Vec<f64>], fit: &Fit) -> Option<Ramp> {
     }
     let used = bins.iter().filter(|b| b.1 > 0.0).count();
     let total: f64 = bins.iter().map(|b| b.1).sum();
-    let noise = rss / (used.saturating_sub(5)).max(1) as f64;
+    let noise = rss / (used.saturating_sub(7)).max(1) as f64;
     // Curvature of the cost along the width, the other parameters refitted.
     let step = (0.05 * width).max(2e-3);
-    let along = |w: f64| {
-        nelder_mead(
-            |p| trapezoid_cost(&bins, &[p[0], p[1], w]).0,
-            [found[0], found[1], w],
-            [0.003, 0.003, 0.0],
-        )
-    };
     let refit = |w: f64| {
-        let p = along(w);
-        trapezoid_cost(&bins, &[p[0], p[1], w]).0
+        let at = |p: &Shape| cost(&[p[0], p[1], w, p[3], p[4]]);
+        let mut p = [found[0], found[1], w, found[3], found[4]];
+        for size in [0.003, 0.001] {
+            p = minimum(
+                at,
+                p,
+                [1.0, 1.0, 0.0, 10.0, 2.0 * shoulder].map(|s| s * size),
+            );
+        }
+        at(&p)
     };
     let bend = (refit(width + step) - 2.0 * rss + refit(width - step)) / (step * step);
     let sampling = fit.model.per_row / 12.0_f64.sqrt() / (total / BINS as f64).sqrt().max(1.0);
-    if bend <= 0.0 {
-        return None;
-    }
-    Some(Ramp {
+    (bend > 0.0).then(|| Ramp {
         periods: width,
         sd: (2.0 * noise / bend).sqrt().hypot(sampling),
         duty,
@@ -128,17 +178,30 @@ fn trapezoid(phase: f64, duty: f64, width: f64) -> f64 {
         - ramp(phase - 1.0 - duty)
 }
 
+/// The tone curve.
+fn bent(x: f64, tone: f64, shoulder: f64) -> f64 {
+    if x <= 0.0 || x >= 1.0 || (tone, shoulder) == (1.0, 1.0) {
+        return x.clamp(0.0, 1.0);
+    }
+    1.0 - (1.0 - x.powf(tone)).powf(shoulder)
+}
+
 /// Weighted sum of squares of the best levels, and those levels (dark, bright).
-fn trapezoid_cost(bins: &[(f64, f64)], &[phase, duty, width]: &[f64; 3]) -> (f64, [f64; 2]) {
-    if !(0.0..=1.0).contains(&duty) || !(0.0..=1.0).contains(&width) {
+fn trapezoid_cost(bins: &Bins, &[phase, duty, width, tone, shoulder]: &Shape) -> (f64, [f64; 2]) {
+    if !(0.0..=1.0).contains(&duty)
+        || !(0.0..=1.0).contains(&width)
+        || !TONES.contains(&tone)
+        || !TONES.contains(&shoulder)
+    {
         return (f64::INFINITY, [0.0, 0.0]);
     }
     let (mut n, mut sx, mut sy, mut sxx, mut sxy, mut syy) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
     for (i, &(value, weight)) in bins.iter().enumerate() {
-        let x = trapezoid(
-            ((i as f64 + 0.5) / BINS as f64 - phase).rem_euclid(1.0),
-            duty,
-            width,
+        let place = (i as f64 + 0.5) / bins.len() as f64;
+        let x = bent(
+            trapezoid((place - phase).rem_euclid(1.0), duty, width),
+            tone,
+            shoulder,
         );
         n += weight;
         sx += weight * x;
@@ -161,51 +224,4 @@ fn trapezoid_cost(bins: &[(f64, f64)], &[phase, duty, width]: &[f64; 3]) -> (f64
         (syy - level * sy - slope * sxy).max(0.0),
         [level, level + slope],
     )
-}
-
-/// Nelder and Mead's simplex in three dimensions.
-fn nelder_mead(cost: impl Fn(&[f64; 3]) -> f64, start: [f64; 3], size: [f64; 3]) -> [f64; 3] {
-    let mut simplex: Vec<([f64; 3], f64)> = (0..4)
-        .map(|i| {
-            let mut p = start;
-            if i > 0 {
-                p[i - 1] += size[i - 1];
-            }
-            (p, cost(&p))
-        })
-        .collect();
-    for _ in 0..160 {
-        simplex.sort_by(|a, b| a.1.total_cmp(&b.1));
-        let worst = simplex[3];
-        let centre: [f64; 3] =
-            std::array::from_fn(|k| simplex[..3].iter().map(|s| s.0[k]).sum::<f64>() / 3.0);
-        let at = |t: f64| {
-            let p: [f64; 3] = std::array::from_fn(|k| centre[k] + t * (centre[k] - worst.0[k]));
-            (p, cost(&p))
-        };
-        let reflected = at(1.0);
-        let next = if reflected.1 < simplex[0].1 {
-            let further = at(2.0);
-            if further.1 < reflected.1 {
-                further
-            } else {
-                reflected
-            }
-        } else if reflected.1 < simplex[2].1 {
-            reflected
-        } else {
-            at(-0.5)
-        };
-        if next.1 < worst.1 {
-            simplex[3] = next;
-        } else {
-            let best = simplex[0].0;
-            for vertex in &mut simplex[1..] {
-                let p: [f64; 3] = std::array::from_fn(|k| 0.5 * (vertex.0[k] + best[k]));
-                *vertex = (p, cost(&p));
-            }
-        }
-    }
-    simplex.sort_by(|a, b| a.1.total_cmp(&b.1));
-    simplex[0].0
 }

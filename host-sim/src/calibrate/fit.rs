@@ -2,14 +2,11 @@
 //!
 //! b and g are linear and are eliminated inside each step (variable projection, Golub and Pereyra 1973, in
 //! Kaufman's form); the rest is Levenberg–Marquardt. The standard deviation of ν comes from what the residuals
-//! do, not from assuming them white: summed over frames ("cluster" sandwich) where there are enough frames, else
-//! over neighbouring rows (Newey and West 1987).
+//! do ([`super::uncertainty`]), not from assuming them white.
 
 use super::model::{Background, Model, legendre};
+use super::uncertainty;
 use crate::linear::{Symmetric, dot, orthonormal};
-
-/// Frames from which on the scatter between frames gives the standard deviation.
-const ENOUGH_FRAMES: usize = 8;
 
 /// Row means: `[frame][row]`.
 pub type Rows = [Vec<f64>];
@@ -333,20 +330,8 @@ impl<'a> Problem<'a> {
                 gain[y] = solved.gain[i];
             }
         }
-        let free = count.saturating_sub(parameters).max(1) as f64;
-        let few = count as f64 / free;
-        let variance = if frames >= ENOUGH_FRAMES {
-            let sums = influence
-                .iter()
-                .map(|f| f.iter().sum::<f64>().powi(2))
-                .sum::<f64>();
-            sums * frames as f64 / (frames - 1) as f64 * few
-        } else {
-            let reach = (1.0 / model.per_row.abs())
-                .min(height as f64 / 4.0)
-                .max(1.0) as usize;
-            influence.iter().map(|f| newey_west(f, reach)).sum::<f64>() * few
-        };
+        let lost = count as f64 / count.saturating_sub(parameters).max(1) as f64;
+        let variance = lost * uncertainty::variance(&influence, &residual);
         Some(Fit {
             model,
             offset,
@@ -358,16 +343,6 @@ impl<'a> Problem<'a> {
             per_row_sd: variance.max(0.0).sqrt(),
         })
     }
-}
-
-/// Variance of the sum of a correlated series, correlations up to `reach` apart counted (Bartlett's weights).
-fn newey_west(series: &[f64], reach: usize) -> f64 {
-    let mut sum = dot(series, series);
-    for lag in 1..=reach.min(series.len().saturating_sub(1)) {
-        let weight = 1.0 - lag as f64 / (reach + 1) as f64;
-        sum += 2.0 * weight * dot(&series[lag..], &series[..series.len() - lag]);
-    }
-    sum
 }
 
 #[cfg(test)]

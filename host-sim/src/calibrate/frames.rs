@@ -6,8 +6,8 @@
 
 use std::f64::consts::TAU;
 
-/// Clock error of the nominal frame times that is allowed for.
-pub const CLOCK_TOLERANCE: f64 = 0.003;
+/// Clock error of the nominal frame times that is allowed for: 30 for 29.97 fps, and crystals.
+pub const CLOCK_TOLERANCE: f64 = 0.0015;
 
 /// Which row is read first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,18 +1,25 @@
 //! From row means to the one fit that is believed, or the reason why there is none.
 
-use super::Refusal;
 use super::fit::{Fit, Problem, Rows};
 use super::model::{Background, Model};
 use super::search::{candidates, periodogram, share};
-use crate::linear::{dot, median, remove};
+use super::{Refusal, fundamental, outliers};
+use crate::linear::{median, remove};
 use std::f64::consts::TAU;
 
 /// How many harmonics are tried, in turn.
-const LADDER: [usize; 10] = [1, 2, 3, 5, 8, 12, 18, 26, 36, 48];
+const LADDER: [usize; 12] = [1, 2, 3, 5, 8, 12, 18, 26, 36, 48, 66, 90];
+/// Peak of the periodogram over its median. White noise in four frames gets that far once in a thousand recordings, in
+/// more frames never.
+const STANDS_OUT: f64 = 8.0;
+/// Least share of the changes that the stripes explain, of a picture with a smooth background and of one without.
+const LEAST_EXPLAINED: [f64; 2] = [0.7, 0.5];
+/// Variance of the rows' means over what chance makes it: over hundreds of rows it then stays within 1.2.
+const OWN_ROWS: f64 = 1.4;
+/// With fewer harmonics than this a switched light is not met well enough.
+const FEWEST_TOLD_APART: usize = 4;
 /// Frames used where the stripes stand still.
 const MOST_STILL_FRAMES: usize = 12;
-/// A fundamental weaker than this part of what was taken for it is not believed.
-const SUBHARMONIC_SHARE: f64 = 0.08;
 
 /// The stripes of a recording.
 #[derive(Clone, Debug)]
@@ -27,7 +34,7 @@ pub struct Stripes {
 
 /// Finds and fits the stripes in row means, `[frame][row]`.
 ///
-/// `most_harmonics` bounds the wave form: 48 for a light that is switched, 6 for a lamp on the mains.
+/// `most_harmonics` bounds the wave form: 90 for a light that is switched, 6 for a lamp on the mains.
 ///
 /// # Errors
 /// Any [`Refusal`] about the stripes themselves.
@@ -88,33 +95,135 @@ pub fn find(rows: &Rows, most_harmonics: usize) -> Result<Stripes, Refusal> {
             .fit(&fit.model, 12)
             .ok_or(Refusal::NoStripes)?;
     }
-    let mut problem = Problem::new(rows, background);
-    let limit = most_harmonics
-        .min(if frames < 4 {
+    let limit = |fit: &Fit, background| {
+        let rows_show = if frames < 4 {
             (0.48 / fit.model.per_row) as usize
         } else {
-            48
-        })
-        .max(1);
-    fit = grow(&problem, fit, limit);
-    let left_out = leave_out(&mut problem, &fit);
-    if left_out.0 > 0 {
-        fit = problem.fit(&fit.model, 12).ok_or(Refusal::NoStripes)?;
-        fit = grow(&problem, fit, limit);
-    }
+            points_show(&fit.model, height)
+        };
+        let frames_show = if background == Background::PerRow {
+            told_apart(&fit.model.phases)
+        } else {
+            usize::MAX
+        };
+        most_harmonics.min(rows_show).min(frames_show).max(1)
+    };
+    // Most pictures are smooth from row to row: to say so spares two unknowns a row.
+    let found = if background == Background::PerRow {
+        match grown(rows, Background::Smooth(4), fit.clone(), limit) {
+            Ok(smooth) if !has_own_rows(&smooth.fit) => smooth,
+            smooth => {
+                let own = grown(rows, background, fit, limit)?;
+                match smooth {
+                    Ok(smooth) if smooth.fit.bic() < own.fit.bic() => smooth,
+                    _ if told_apart(&own.fit.model.phases)
+                        < FEWEST_TOLD_APART.min(most_harmonics) =>
+                    {
+                        return Err(Refusal::FewPhases);
+                    }
+                    _ => own,
+                }
+            }
+        }
+    } else {
+        grown(rows, background, fit, limit)?
+    };
+    let Grown {
+        problem,
+        fit,
+        left_out,
+    } = found;
+    let limit = limit(&fit, problem.background);
     if left_out.0 * 10 > left_out.1 * 3 {
         return Err(Refusal::Irregular {
             left_out: left_out.0,
             stripes: left_out.1,
         });
     }
-    check_fundamental(&problem, &fit, limit)?;
+    fundamental::check(&problem, &fit, limit)?;
     check_quality(&problem, &fit)?;
     Ok(Stripes {
+        background: problem.background,
         fit,
-        background,
         left_out,
     })
+}
+
+/// A fit with as many harmonics as pay, failed flashes left out.
+struct Grown<'a> {
+    problem: Problem<'a>,
+    fit: Fit,
+    left_out: (usize, usize),
+}
+
+fn grown(
+    rows: &Rows,
+    background: Background,
+    start: Fit,
+    limit: impl Fn(&Fit, Background) -> usize,
+) -> Result<Grown<'_>, Refusal> {
+    let mut problem = Problem::new(rows, background);
+    let mut first = start.model;
+    first.harmonics.truncate(2);
+    let fit = problem.fit(&first, 8).ok_or(Refusal::NoStripes)?;
+    let most = limit(&fit, background);
+    let mut fit = grow(&problem, fit, most);
+    let left_out = outliers::leave_out(&mut problem, &mut fit, |problem, fit| {
+        let again = problem.fit(&fit.model, 12).ok_or(Refusal::NoStripes)?;
+        Ok(grow(problem, again, most))
+    })?;
+    Ok(Grown {
+        problem,
+        fit,
+        left_out,
+    })
+}
+
+/// Whether rows keep offsets of their own that the fit's smooth background leaves: their means over the frames are
+/// larger than the scatter about them makes them.
+fn has_own_rows(fit: &Fit) -> bool {
+    let frames = fit.residual.len() as f64;
+    let (mut of_means, mut within) = (0.0, 0.0);
+    for y in 0..fit.gain.len() {
+        let mean = fit.residual.iter().map(|f| f[y]).sum::<f64>() / frames;
+        of_means += mean * mean;
+        within += fit
+            .residual
+            .iter()
+            .map(|f| (f[y] - mean).powi(2))
+            .sum::<f64>();
+    }
+    of_means * frames > OWN_ROWS * within / (frames - 1.0)
+}
+
+/// Harmonics that the points of the period at which there is a row in some frame can show: half a period of the
+/// highest is not to fall into the widest gap between them.
+fn points_show(model: &Model, height: usize) -> usize {
+    let mut points: Vec<f64> = (0..model.phases.len())
+        .flat_map(|n| (0..height).map(move |y| (n, y)))
+        .map(|(n, y)| (model.psi(n, y as f64) / TAU).rem_euclid(1.0))
+        .collect();
+    points.sort_by(f64::total_cmp);
+    let around = points[0] + 1.0 - points[points.len() - 1];
+    let widest = points
+        .windows(2)
+        .map(|w| w[1] - w[0])
+        .fold(around, f64::max);
+    (0.5 / widest) as usize
+}
+
+/// Harmonics below the first that the frames see at one phase only: over the frames it, and those beside it, look like
+/// the picture behind the stripes and like their own amplitude. Stripes that move by a third of a period a frame leave 1.
+fn told_apart(phases: &[f64]) -> usize {
+    if phases.len() < 4 || resultant(phases) > 0.7 {
+        return usize::MAX;
+    }
+    (2..64)
+        .find(|&h| {
+            let turned: Vec<f64> = phases.iter().map(|p| f64::from(h) * p).collect();
+            resultant(&turned) > 0.9
+        })
+        .map_or(usize::MAX, |h| h as usize - 2)
 }
 
 /// Less than half a stripe a row, and at least a good half of one in the frame.
@@ -150,12 +259,17 @@ fn without_gradient(rows: &Rows) -> Vec<Vec<f64>> {
         .collect()
 }
 
+/// Whether there is more than noise: the periodogram's peak holds a good part of the power and stands out.
 fn is_striped(rows: &Rows) -> bool {
     let (step, power) = periodogram(rows);
     let height = rows[0].len();
+    let floor = median(&power);
     candidates(step, &power, 0.6 / height as f64, 1)
         .first()
-        .is_some_and(|&per_row| share(step, &power, height, per_row) > 0.15)
+        .is_some_and(|&per_row| {
+            let peak = power[((per_row / step).round() as usize).min(power.len() - 1)];
+            peak > STANDS_OUT * floor && share(step, &power, height, per_row) > 0.15
+        })
 }
 
 fn start_values(rows: &Rows, count: usize) -> Vec<f64> {
@@ -186,8 +300,12 @@ fn first_model(rows: &Rows, per_row: f64) -> Model {
 }
 
 /// More harmonics, as long as they pay for themselves.
+///
+/// Where they still do at `limit`, the wave form is not met: what the last ones moved ν by is then added to its standard
+/// deviation. (In a few frames the rows cannot show more, and what is left is in the residuals of their neighbours.)
 fn grow(problem: &Problem<'_>, mut fit: Fit, limit: usize) -> Fit {
     let mut misses = 0;
+    let mut moved = 0.0;
     for &count in LADDER.iter().filter(|&&c| c <= limit) {
         if count <= fit.model.harmonics.len() {
             continue;
@@ -196,14 +314,19 @@ fn grow(problem: &Problem<'_>, mut fit: Fit, limit: usize) -> Fit {
         start.harmonics.resize(count, [0.0, 0.0]);
         match problem.fit(&start, 3) {
             Some(next) if next.bic() < fit.bic() => {
+                moved = next.model.per_row - fit.model.per_row;
                 fit = next;
                 misses = 0;
             }
             _ => misses += 1,
         }
-        if misses == 2 {
+        // A wave form may lack even harmonics, but hardly all from 18 to 26.
+        if misses == 2 || (misses == 1 && count > 20) {
             break;
         }
+    }
+    if misses == 0 && problem.rows.len() >= 4 {
+        fit.per_row_sd = fit.per_row_sd.hypot(moved);
     }
     fit
 }
@@ -219,101 +342,6 @@ pub fn resultant(phases: &[f64]) -> f64 {
     re.hypot(im) / phases.len().max(1) as f64
 }
 
-/// Marks stripes whose residual is out of all proportion (the light missed a flash), and counts them.
-fn leave_out(problem: &mut Problem<'_>, fit: &Fit) -> (usize, usize) {
-    let mut stripes: Vec<(usize, usize, usize, f64)> = Vec::new();
-    let height = fit.gain.len();
-    let centre = 0.5 * (height as f64 - 1.0);
-    for (n, frame) in fit.residual.iter().enumerate() {
-        let number =
-            |y: usize| (fit.model.per_row * (y as f64 - centre) + fit.model.phases[n]).round();
-        let mut first = 0;
-        for y in 1..=height {
-            if y == height || number(y) != number(first) {
-                let rms = (dot(&frame[first..y], &frame[first..y]) / (y - first) as f64).sqrt();
-                stripes.push((n, first, y, rms));
-                first = y;
-            }
-        }
-    }
-    let typical = median(&stripes.iter().map(|s| s.3).collect::<Vec<_>>());
-    let gain = median(&fit.gain).abs();
-    let mut count = 0;
-    for &(n, first, last, rms) in &stripes {
-        if rms > 4.0 * typical && rms > 0.15 * gain {
-            problem.used[n][first..last].fill(false);
-            count += 1;
-        }
-    }
-    (count, stripes.len())
-}
-
-/// Refuses where every second or third stripe differs from its neighbours: the fundamental is then lower.
-fn check_fundamental(problem: &Problem<'_>, fit: &Fit, limit: usize) -> Result<(), Refusal> {
-    let height = fit.gain.len() as f64;
-    for divisor in [2usize, 3] {
-        let per_row = fit.model.per_row / divisor as f64;
-        if per_row * height < 2.0 {
-            continue;
-        }
-        let kept = fit.model.harmonics.len().min(limit / divisor).clamp(1, 8);
-        let mut start = fit.model.clone();
-        start.harmonics.truncate(kept);
-        let Some(alone) = problem.fit(&start, 4) else {
-            continue;
-        };
-        // The pattern again, its fundamental now the `divisor`th harmonic: amplitudes relative to that one.
-        let mut residual = alone.residual.clone();
-        for (frame, used) in residual.iter_mut().zip(&problem.used) {
-            for (y, value) in frame.iter_mut().enumerate() {
-                *value = if used[y] && alone.gain[y].is_finite() {
-                    *value / alone.gain[y]
-                } else {
-                    0.0
-                };
-            }
-        }
-        let mut strongest: f64 = 0.0;
-        for order in 1..divisor {
-            strongest = strongest.max(coherent(
-                &residual,
-                &alone.model,
-                order as f64 / divisor as f64,
-            ));
-        }
-        if strongest > SUBHARMONIC_SHARE {
-            return Err(Refusal::Subharmonic {
-                divisor,
-                share: strongest,
-            });
-        }
-    }
-    Ok(())
-}
-
-/// Amplitude of a component at `ratio` times the fundamental, coherent over the frames up to the unknown count of whole periods.
-fn coherent(residual: &[Vec<f64>], model: &Model, ratio: f64) -> f64 {
-    let height = residual[0].len();
-    let centre = 0.5 * (height as f64 - 1.0);
-    let mut power = 0.0;
-    let (mut values, mut noise) = (0usize, 0.0);
-    for frame in residual {
-        let (mut re, mut im) = (0.0, 0.0);
-        for (y, &value) in frame.iter().enumerate() {
-            let (s, c) = (TAU * ratio * model.per_row * (y as f64 - centre)).sin_cos();
-            re += value * c;
-            im += value * s;
-            noise += value * value;
-        }
-        values += height;
-        power += (re * re + im * im) / (height as f64).powi(2);
-    }
-    let floor = noise / values as f64 / height as f64;
-    2.0 * (power / residual.len() as f64 - 3.0 * floor)
-        .max(0.0)
-        .sqrt()
-}
-
 /// Refuses a fit that the data do not call for.
 fn check_quality(problem: &Problem<'_>, fit: &Fit) -> Result<(), Refusal> {
     let relative = fit.per_row_sd / fit.model.per_row;
@@ -326,19 +354,25 @@ fn check_quality(problem: &Problem<'_>, fit: &Fit) -> Result<(), Refusal> {
             relative_sd: relative,
         });
     }
-    if let Background::Smooth(_) = problem.background {
-        let striped: f64 = problem
-            .rows
-            .iter()
-            .enumerate()
-            .flat_map(|(n, frame)| (0..frame.len()).map(move |y| (n, y)))
-            .filter(|&(n, y)| problem.used[n][y])
-            .map(|(n, y)| (problem.rows[n][y] - fit.offset[y]).powi(2))
-            .sum();
-        let explained = 1.0 - fit.rss / striped.max(f64::MIN_POSITIVE);
-        if explained < 0.7 {
-            return Err(Refusal::OtherPattern { explained });
-        }
+    let striped: f64 = problem
+        .rows
+        .iter()
+        .enumerate()
+        .flat_map(|(n, frame)| (0..frame.len()).map(move |y| (n, y)))
+        .filter(|&(n, y)| problem.used[n][y] && fit.offset[y].is_finite())
+        .map(|(n, y)| (problem.rows[n][y] - fit.offset[y]).powi(2))
+        .sum();
+    // What the parameters would explain of mere noise does not count.
+    let lost = fit.count as f64 / fit.count.saturating_sub(fit.parameters).max(1) as f64;
+    let explained = 1.0 - lost * fit.rss / striped.max(f64::MIN_POSITIVE);
+    let [smooth, per_row] = LEAST_EXPLAINED;
+    let least = if problem.background == Background::PerRow {
+        per_row
+    } else {
+        smooth
+    };
+    if explained < least {
+        return Err(Refusal::OtherPattern { explained });
     }
     let periods = fit.model.per_row * fit.gain.len() as f64;
     let least = if problem.background == Background::PerRow {

@@ -1,0 +1,250 @@
+//! Calibrations of simulated cameras: right, refused or wrong, and do their standard deviations say how right?
+
+use std::fmt::Write;
+
+use super::file::RollingName;
+use super::rows::{Collector, Recording};
+use super::{Calibration, calibrate, vibration};
+use crate::sim::{Camera, Config, PixelBuffer, SimError};
+
+pub mod condition;
+
+use condition::{Condition, Source};
+
+/// Further than so many stated standard deviations is wrong. Chance does that once in 16 000 times.
+const FURTHEST: f64 = 4.0;
+
+/// What became of one recording.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Outcome {
+    /// All that was told is right.
+    Right {
+        /// Relative error of the line time.
+        error: f64,
+        /// Its stated standard deviation.
+        sd: f64,
+    },
+    /// Nothing was told, and why.
+    Refused(String),
+    /// Something that was told is not right.
+    Wrong(String),
+}
+
+/// The recording number `seed` of a condition: its own noise, and the light's phase and (mains) frequency by chance.
+fn config(condition: &Condition, seed: u64) -> Config {
+    let mut config = condition.config.clone();
+    config.seed = seed;
+    // Two golden sequences: even over their range, and not in step with each other.
+    let [a, b] = [0.618_033_988_75, 0.754_877_666_2].map(|g: f64| (g * seed as f64).fract());
+    if let Some(led) = &mut config.light.led {
+        // Whole periods too: which flashes fail hangs on their number.
+        led.phase = a + 10_000.0 * seed as f64;
+    }
+    if let Some(flicker) = &mut config.light.flicker {
+        flicker.phase_rad = std::f64::consts::TAU * a;
+        // Mains keep to ±0.03 Hz of 50.
+        flicker.hz *= 1.0 + 6e-4 * 3.0_f64.sqrt() * (2.0 * b - 1.0);
+    }
+    for tone in &mut config.motion.tones {
+        tone.phase_rad = std::f64::consts::TAU * a;
+    }
+    config
+}
+
+/// Films it.
+fn record(condition: &Condition, seed: u64) -> Result<Result<Recording, String>, SimError> {
+    let config = config(condition, seed);
+    let fps = config.sensor.fps;
+    let width = config.sensor.cols as usize;
+    let camera = Camera::new(config)?;
+    let mut times = Vec::new();
+    let mut pictures = Vec::new();
+    for frame in camera.frames() {
+        times.push(frame.start_ns as f64 * 1e-9);
+        pictures.push(match frame.pixels {
+            PixelBuffer::U8(p) => p.iter().map(|&v| u16::from(v)).collect::<Vec<u16>>(),
+            PixelBuffer::U16(p) => p,
+        });
+    }
+    if !condition.times {
+        times = (0..times.len()).map(|n| n as f64 / fps).collect();
+    }
+    let times = (times.len() > 1).then_some(times);
+    Ok(match condition.source {
+        Source::Brightness => {
+            let mut collector = Collector::new(width, 255);
+            for picture in &pictures {
+                collector.push(picture.chunks_exact(width));
+            }
+            Ok(collector.finish(times, Some(fps)))
+        }
+        Source::Displacement => {
+            let pictures: Vec<_> = pictures.into_iter().map(|p| (p, width)).collect();
+            vibration::displacements(&pictures)
+                .map(|rows| Recording {
+                    rows,
+                    times_s: times,
+                    fps: Some(fps),
+                    saturated_share: 0.0,
+                })
+                .map_err(|why| why.to_string())
+        }
+    })
+}
+
+/// Films and calibrates.
+///
+/// # Errors
+/// [`SimError`] for an impossible configuration.
+pub fn run(condition: &Condition, seed: u64) -> Result<Outcome, SimError> {
+    let recording = match record(condition, seed)? {
+        Ok(recording) => recording,
+        Err(why) => return Ok(Outcome::Refused(why)),
+    };
+    Ok(match calibrate(&recording, condition.light) {
+        Err(refusal) => Outcome::Refused(refusal.to_string()),
+        Ok(found) => judge(condition, &found),
+    })
+}
+
+fn judge(condition: &Condition, found: &Calibration) -> Outcome {
+    let sensor = &condition.config.sensor;
+    let line_time_s = f64::from(sensor.line_time_ps) * 1e-12;
+    if condition.hopeless {
+        return Outcome::Wrong(format!("told {:.3} µs", 1e6 * found.line_time_s));
+    }
+    let rolling = if sensor.bottom_up {
+        RollingName::Up
+    } else {
+        RollingName::Down
+    };
+    if found.rolling.is_some_and(|r| r != rolling) {
+        return Outcome::Wrong("rolling direction".to_owned());
+    }
+    let period_s = 1.0 / sensor.fps;
+    let one_rate = condition.config.rate_changes.is_empty();
+    for (name, value, sd, truth) in [
+        (
+            "line time",
+            Some(found.line_time_s),
+            Some(found.line_time_s_sd),
+            line_time_s,
+        ),
+        (
+            "frame period",
+            found.frame_period_s.filter(|_| one_rate),
+            found.frame_period_s_sd,
+            period_s,
+        ),
+        (
+            "blank time",
+            found.blank_s.filter(|_| one_rate),
+            found.blank_s_sd,
+            period_s - line_time_s * f64::from(sensor.rows),
+        ),
+        (
+            "exposure",
+            found.exposure_s,
+            found.exposure_s_sd,
+            f64::from(sensor.exposure_ns) * 1e-9,
+        ),
+    ] {
+        if let (Some(value), Some(sd)) = (value, sd) {
+            let off = (value - truth) / sd;
+            // The simulator keeps its frames' starts in whole nanoseconds.
+            let rounding = if name == "frame period" { 1e-9 } else { 0.0 };
+            if off.abs() > FURTHEST && (value - truth).abs() > rounding {
+                return Outcome::Wrong(format!("{name} off by {off:+.1} standard deviations"));
+            }
+        }
+    }
+    Outcome::Right {
+        error: found.line_time_s / line_time_s - 1.0,
+        sd: found.line_time_s_sd / line_time_s,
+    }
+}
+
+/// What became of many recordings of one condition.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Tally {
+    /// Right, refused, wrong.
+    pub counts: [u64; 3],
+    /// Sums of error², sd² and (error / sd)² over the right ones.
+    sums: [f64; 3],
+    /// The first reason of each kind.
+    pub reasons: Vec<String>,
+}
+
+impl Tally {
+    /// Of the recordings `first..first + seeds`.
+    ///
+    /// # Errors
+    /// [`SimError`] for an impossible configuration.
+    pub fn of(condition: &Condition, first: u64, seeds: u64) -> Result<Self, SimError> {
+        let mut tally = Self::default();
+        for seed in first..first + seeds {
+            match run(condition, seed)? {
+                Outcome::Right { error, sd } => {
+                    tally.counts[0] += 1;
+                    for (sum, value) in tally.sums.iter_mut().zip([error, sd, error / sd]) {
+                        *sum += value * value;
+                    }
+                }
+                Outcome::Refused(why) => tally.count(1, "refused", &why),
+                Outcome::Wrong(why) => tally.count(2, "WRONG", &why),
+            }
+        }
+        Ok(tally)
+    }
+
+    fn count(&mut self, kind: usize, name: &str, why: &str) {
+        if self.counts[kind] == 0 {
+            let short: String = why.chars().take_while(|&c| c != ':').collect();
+            self.reasons.push(format!("{name}: {short}"));
+        }
+        self.counts[kind] += 1;
+    }
+
+    /// Rms of the relative error, of the stated standard deviation, and of their ratio.
+    pub fn rms(&self) -> [f64; 3] {
+        self.sums
+            .map(|sum| (sum / (self.counts[0] as f64).max(1.0)).sqrt())
+    }
+}
+
+/// Head of the table, as Markdown.
+pub const HEAD: &str = "\
+| condition | right | refused | wrong | rms error (relative) | stated sd | error / sd (rms) | why |
+| :-- | --: | --: | --: | --: | --: | --: | :-- |";
+
+/// One line of the table.
+///
+/// # Errors
+/// [`SimError`] for an impossible configuration.
+pub fn row(condition: &Condition, first: u64, seeds: u64) -> Result<String, SimError> {
+    let tally = Tally::of(condition, first, seeds)?;
+    let [right, refused, wrong] = tally.counts;
+    let mut text = format!("| {} | {right} | {refused} | {wrong} |", condition.name);
+    // Writing to a string cannot fail.
+    if right > 0 {
+        let [error, sd, ratio] = tally.rms();
+        let _ = write!(text, " {error:.1e} | {sd:.1e} | {ratio:.2} |");
+    } else {
+        text.push_str(" | | |");
+    }
+    let _ = write!(text, " {} |", tally.reasons.join("; "));
+    Ok(text)
+}
+
+/// `seeds` recordings of every condition, as Markdown.
+///
+/// # Errors
+/// [`SimError`] for an impossible configuration.
+pub fn markdown(seeds: u64) -> Result<String, SimError> {
+    let mut text = format!("{HEAD}\n");
+    for condition in condition::all() {
+        text += &row(&condition, 1, seeds)?;
+        text.push('\n');
+    }
+    Ok(text)
+}

@@ -1,0 +1,121 @@
+//! How sure the stripes a row are, from what the fit leaves.
+//!
+//! The error of ν is a weighted sum of the noise: its variance is that of Σ u, u = weight · residual ("sandwich").
+//! Two estimates of it are put together:
+//!
+//! - over neighbouring rows: Σ u² and the products of rows as far apart as the residuals are really correlated, which
+//!   is read off their autocorrelation (Politis 2003). It has hundreds of degrees of freedom, but sees only what
+//!   hangs together over a few rows;
+//! - between frames: the scatter of each frame's own Σ u. It sees everything that differs from frame to frame, but has
+//!   only frames − 1 degrees of freedom. With ten frames error over standard deviation would follow Student's t with 9,
+//!   whose rms is √(9/7) = 1.13 even if the variance is right on average.
+//!
+//! They are averaged by their degrees of freedom, those of the rows counted as no more than [`ROWS_COUNT_FOR`], so
+//! that the scatter between frames has the last word in a long recording.
+
+use crate::linear::dot;
+
+/// Degrees of freedom that the estimate over rows counts for.
+const ROWS_COUNT_FOR: f64 = 12.0;
+/// Lags in a row that must be insignificant.
+const SILENT_LAGS: usize = 5;
+
+/// Variance of the sum of `influence`, `[frame][row]`; `residual` (0 where a value was left out) tells how far rows hang
+/// together. What the fit itself has taken from the residuals is not made up for here.
+pub(super) fn variance(influence: &[Vec<f64>], residual: &[Vec<f64>]) -> f64 {
+    let height = residual.first().map_or(0, Vec::len);
+    let over_rows = rows(influence, correlated_lags(residual, height / 4));
+    let frames = influence.len() as f64;
+    if frames < 2.0 {
+        return over_rows;
+    }
+    let between: f64 = influence
+        .iter()
+        .map(|f| f.iter().sum::<f64>().powi(2))
+        .sum::<f64>()
+        * frames
+        / (frames - 1.0);
+    (ROWS_COUNT_FOR * over_rows + (frames - 1.0) * between) / (ROWS_COUNT_FOR + frames - 1.0)
+}
+
+/// The last lag at which the residuals are correlated: [`SILENT_LAGS`] after it are within what chance does.
+fn correlated_lags(residual: &[Vec<f64>], most: usize) -> usize {
+    let count = residual
+        .iter()
+        .flatten()
+        .filter(|r| **r != 0.0)
+        .count()
+        .max(2) as f64;
+    let power = product(residual, 0);
+    // Politis's threshold, 2·√(log10 n / n).
+    let chance = 2.0 * (count.log10() / count).sqrt() * power;
+    let significant = |lag: usize| product(residual, lag).abs() > chance;
+    let mut last = 0;
+    for lag in 1..=most {
+        if significant(lag) {
+            last = lag;
+        } else if lag >= last + SILENT_LAGS {
+            break;
+        }
+    }
+    last
+}
+
+/// Sum of the products of values `lag` rows apart, over all frames.
+fn product(series: &[Vec<f64>], lag: usize) -> f64 {
+    series
+        .iter()
+        .filter(|f| f.len() > lag)
+        .map(|f| dot(&f[lag..], &f[..f.len() - lag]))
+        .sum()
+}
+
+/// Variance of the sum: products up to `last` apart count fully, then ever less up to twice that (a flat top).
+fn rows(influence: &[Vec<f64>], last: usize) -> f64 {
+    let white = product(influence, 0);
+    let mut sum = white;
+    for lag in 1..=2 * last {
+        let weight = (2.0 - lag as f64 / last as f64).min(1.0);
+        sum += 2.0 * weight * product(influence, lag);
+    }
+    // The estimate can come out negative; neighbours that cancel are not believed to halve the error.
+    sum.max(0.25 * white)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn noise(frames: usize, rows: usize, smooth: usize) -> Vec<Vec<f64>> {
+        let mut state = 7u32;
+        let mut uniform = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            f64::from(state >> 8) / f64::from(1 << 24) - 0.5
+        };
+        (0..frames)
+            .map(|_| {
+                let white: Vec<f64> = (0..rows + smooth).map(|_| uniform()).collect();
+                white
+                    .windows(smooth)
+                    .take(rows)
+                    .map(|w| w.iter().sum())
+                    .collect()
+            })
+            .collect()
+    }
+
+    #[test]
+    fn white_noise_hangs_together_over_no_rows() {
+        assert_eq!(correlated_lags(&noise(4, 300, 1), 75), 0);
+    }
+
+    /// The sum of 300 running sums of 4 has nearly 16 times the variance of the sum of 300 white values.
+    #[test]
+    fn smoothed_noise_counts_as_what_it_is() {
+        let smooth = noise(8, 300, 4);
+        let lags = correlated_lags(&smooth, 75);
+        assert!((2..=6).contains(&lags), "{lags}");
+        let found = rows(&smooth, lags) / (8.0 * 300.0 / 12.0);
+        assert!((11.0..21.0).contains(&found), "{found}");
+    }
+}
