@@ -2,6 +2,7 @@
 
 use std::io::Write;
 
+use crate::calibrate::study;
 use crate::failure::Failure;
 use crate::line_scenes::{case, table as line_table};
 use crate::output::Out;
@@ -28,8 +29,31 @@ enum What {
     FewFrames(FewFrames),
     /// Days of samples at 50 000 lines a second through one analyzer: drift, growth, wrapped counters
     Days(Days),
+    /// Simulated cameras calibrated: what is right, refused or wrong, and errors over their stated deviations
+    Calibration(Calibration),
     /// Simulated recordings through the line engine: noise over the bound, amplitude, what it invents
     Lines(Lines),
+}
+
+/// Options of `rowtone sweep calibration`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Columns: recordings in which all that was told is right (within 4 stated standard deviations), in which
+nothing was told, and in which something was wrong; rms of the line time's relative error, of its stated
+deviation, and of their ratio; the first reason of each kind.
+
+Example:
+  rowtone sweep calibration --seeds 40 --only frame")]
+struct Calibration {
+    /// Recordings of each condition
+    #[arg(long, default_value_t = 40, value_parser = clap::value_parser!(u64).range(1..))]
+    seeds: u64,
+    /// The first recording's number
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Only conditions with this in their name
+    #[arg(long, value_name = "TEXT", default_value = "")]
+    only: String,
 }
 
 /// Options of `rowtone sweep lines`.
@@ -141,8 +165,23 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         What::Cameras(options) => camera_scenes(options),
         What::FewFrames(options) => few_frames(options),
         What::Days(options) => many_days(options),
+        What::Calibration(options) => calibration(options),
         What::Lines(options) => lines(options),
     }
+}
+
+fn calibration(options: &Calibration) -> Result<(), Failure> {
+    let mut out = std::io::stdout().lock();
+    let failed = |error| Failure::writing("standard output", &error);
+    writeln!(out, "{}", study::HEAD).map_err(failed)?;
+    for condition in study::condition::all() {
+        if condition.name.contains(&options.only) {
+            let row = study::row(&condition, options.seed, options.seeds)
+                .map_err(|error| Failure::usage(error.to_string()))?;
+            writeln!(out, "{row}").map_err(failed)?;
+        }
+    }
+    Ok(())
 }
 
 fn lines(options: &Lines) -> Result<(), Failure> {
