@@ -1,7 +1,7 @@
 //! `rowtone displacement`: the motion itself, over time.
 
 use std::fs::File;
-use std::io::{self, BufWriter, Cursor, IsTerminal, Write};
+use std::io::{self, BufWriter, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
@@ -11,6 +11,9 @@ use crate::failure::Failure;
 use crate::input::{Camera, CameraArgs, Feed};
 use crate::output::progress::Progress;
 use crate::output::series::{Measured, Series, Shift};
+use crate::output::wav;
+use crate::restore::Method;
+use crate::restore::long::{Restoration, USUAL_CORNER_HZ};
 use crate::tracking::{FrameShifts, Shifts};
 
 /// Samples a second that `--rows-per-sample` aims at when it is not given.
@@ -22,8 +25,13 @@ const USUAL_RATE_HZ: f64 = 8000.0;
     after_help = "Example:\n  rowtone displacement clip.y4m --line-time-us 18.9 -o motion.csv\n\n\
     CSV: t_s,row,d_px,sd_px. t_s is the middle of the sample's exposure, row its first row in the \
     (turned) picture; d_px and sd_px are empty where it could not be measured. Each row's mean over \
-    the recording is removed. NPY: the same columns as 64-bit floats. WAV: 32-bit floats in px at a \
-    constant rate, gaps bridged."
+    the recording is removed. NPY: the same columns as 64-bit floats. Both hold what was measured and \
+    nothing else.\n\n\
+    WAV: a sound without gaps, 32-bit floats in px at a constant rate: blank time, lost frames and rows \
+    that could not be measured are filled by an autoregressive model and tones (Janssen; an estimate, \
+    good for the ear, no measurement), the mean is removed, and a Butterworth low-pass of order 6 run \
+    both ways. All samples are kept until the end: some 16 bytes each, 460 MB an hour at 8000 a \
+    second; a WAV file ends at 4 GiB, 37 hours at that rate."
 )]
 pub struct Args {
     #[command(flatten)]
@@ -35,6 +43,12 @@ pub struct Args {
     /// Format of the output [default: by the ending of -o, else csv]
     #[arg(long, value_enum)]
     format: Option<Format>,
+    /// WAV: how gaps are filled: ar, tones, median, linear or zero [default: ar]
+    #[arg(long, value_name = "HOW")]
+    fill: Option<Method>,
+    /// WAV: corner of the low-pass, Hz; 0 for none [default: 1000]
+    #[arg(long, value_name = "F", value_parser = corner, allow_negative_numbers = true)]
+    low_pass_hz: Option<f64>,
     /// Where to write [default: standard output]
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -48,7 +62,22 @@ enum Format {
     Npy,
 }
 
+/// A corner frequency, or 0.
+fn corner(text: &str) -> Result<f64, String> {
+    let number = text.parse().ok();
+    number
+        .filter(|hz| *hz == 0.0 || (1.0..=1e6).contains(hz))
+        .ok_or_else(|| "want a number from 1 to 1000000 Hz, or 0 for none".to_owned())
+}
+
 impl Args {
+    fn restoration(&self) -> Restoration {
+        Restoration {
+            method: self.fill.unwrap_or(Method::Ar),
+            low_pass_hz: Some(self.low_pass_hz.unwrap_or(USUAL_CORNER_HZ)).filter(|hz| *hz > 0.0),
+        }
+    }
+
     fn format(&self) -> Format {
         let ending = self.output.as_ref().and_then(|path| path.extension());
         self.format
@@ -71,6 +100,11 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             "this format is not for a terminal: give -o FILE",
         ));
     }
+    if format != Format::Wav && (args.low_pass_hz.is_some() || args.fill.is_some()) {
+        return Err(Failure::usage(
+            "--fill and --low-pass-hz are for WAV: CSV and NPY hold what was measured",
+        ));
+    }
     let mut shifts = Shifts::start(Feed::open(&args.camera)?, None)?;
     let rows_per_sample = rows_per_sample(args.rows_per_sample, &shifts);
     let slots = shifts.part.height.div_ceil(rows_per_sample);
@@ -85,7 +119,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             args,
             format,
             &series,
-            rate_hz(rows_per_sample, &shifts.camera),
+            rate_hz(rows_per_sample, slots, &shifts.camera),
         )?;
         if series.measured() == 0 {
             return outcome.and(Err(Failure::input(format!(
@@ -110,8 +144,8 @@ fn rows_per_sample(asked: Option<u16>, shifts: &Shifts) -> usize {
 }
 
 /// Samples a second, as a WAV file states it.
-fn rate_hz(rows_per_sample: usize, camera: &Camera) -> u32 {
-    let rate = if camera.timing.is_global_shutter() {
+fn rate_hz(rows_per_sample: usize, slots: usize, camera: &Camera) -> u32 {
+    let rate = if slots == 1 {
         camera.fps
     } else {
         1e12 / (rows_per_sample as f64 * f64::from(camera.timing.line_time_ps()))
@@ -172,17 +206,32 @@ fn write(args: &Args, format: Format, series: &Series, rate_hz: u32) -> Result<(
     let um_per_px = args.camera.um_per_px;
     let place = args.output.as_deref();
     let name = place.map_or("standard output".to_owned(), |p| p.display().to_string());
-    let mut wav = Cursor::new(Vec::new());
     let written = match format {
         Format::Csv => write_to(place, |to| series.write_csv(to, um_per_px)),
         Format::Npy => write_to(place, |to| series.write_npy(to)),
-        // A WAV file's header needs its length, and a pipe cannot seek.
-        Format::Wav => series
-            .write_wav(&mut wav, rate_hz)
-            .map_err(io::Error::other)
-            .and_then(|()| write_to(place, |to| to.write_all(wav.get_ref()))),
+        Format::Wav => {
+            let sound = sound(series, rate_hz, &args.restoration());
+            write_to(place, |to| wav::write(to, rate_hz, &sound))
+        }
     };
     written.map_err(|e| Failure::writing(&name, &e))
+}
+
+/// The motion as a sound: at a constant rate, filled, filtered and without its mean.
+fn sound(series: &Series, rate_hz: u32, how: &Restoration) -> Vec<f32> {
+    let progress = Progress::new(Some(series.frames() as u64));
+    let mut sound: Vec<f32> = Vec::new();
+    let rate = f64::from(rate_hz);
+    let samples_per_frame = (series.duration_s() * rate / series.frames() as f64).max(1.0) as usize;
+    how.run(series.evenly(rate), rate, |value| {
+        sound.push(value as f32);
+        if sound.len().is_multiple_of(samples_per_frame) {
+            progress.step();
+        }
+    });
+    let mean = sound.iter().map(|&v| f64::from(v)).sum::<f64>() / sound.len().max(1) as f64;
+    sound.iter_mut().for_each(|v| *v -= mean as f32);
+    sound
 }
 
 /// Lets `fill` write to a file or to standard output.

@@ -9,6 +9,7 @@ pub mod plot;
 pub mod progress;
 pub mod series;
 pub mod text;
+pub mod wav;
 pub mod zone;
 
 use std::io::{self, Write};

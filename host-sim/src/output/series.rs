@@ -1,9 +1,9 @@
-//! A displacement over time, as CSV, NPY or WAV.
+//! A displacement over time, as CSV, NPY or at a constant rate.
 //!
 //! The offset of every row against its reference is arbitrary but constant, so each row's mean over the
 //! whole recording has to go: a [`Series`] keeps 12 bytes a sample until the end.
 
-use std::io::{self, Seek, Write};
+use std::io::{self, Write};
 
 /// Where a sample could not be measured, its information.
 const NOT_MEASURED: f32 = 0.0;
@@ -93,6 +93,13 @@ impl Series {
             .count()
     }
 
+    /// From the first sample to the last, s.
+    pub fn duration_s(&self) -> f64 {
+        let (first, last) = (self.frames_ns.first(), self.frames_ns.last());
+        let frames = first.zip(last).map_or(0.0, |(a, b)| (b - a) as f64 * 1e-9);
+        frames + f64::from(self.after_s.last().copied().unwrap_or(0.0))
+    }
+
     /// Subtracts each slot's mean over the recording, weighted by information.
     pub fn remove_means(&mut self) {
         for slot in 0..self.slots {
@@ -173,51 +180,61 @@ impl Series {
         Ok(())
     }
 
-    /// The displacement at a constant rate, px: between samples (over blank time, lost frames and rows
-    /// that could not be measured) along a straight line. Empty when nothing was measured.
-    pub fn evenly(&self, rate_hz: f64) -> Vec<f32> {
-        let mut known = self.samples().filter_map(|s| Some((s.t_s, s.d_px?.0)));
-        let Some(mut before) = known.next() else {
-            return Vec::new();
-        };
-        let start = before.0;
-        let mut values = vec![before.1 as f32];
-        for next in known {
-            loop {
-                let t = start + values.len() as f64 / rate_hz;
-                if t > next.0 {
-                    break;
-                }
-                let share = (t - before.0) / (next.0 - before.0);
-                values.push((before.1 + share * (next.1 - before.1)) as f32);
-            }
-            before = next;
-        }
-        values
-    }
-
-    /// As a WAV file of 32-bit floats in px, one channel, at `rate_hz`.
+    /// The displacement at a constant rate, px; `None` in blank time, lost frames and rows that could not be measured.
     ///
-    /// # Errors
-    /// What writing says.
-    pub fn write_wav(&self, to: impl Write + Seek, rate_hz: u32) -> Result<(), hound::Error> {
-        let spec = hound::WavSpec {
-            channels: 1,
-            sample_rate: rate_hz,
-            bits_per_sample: 32,
-            sample_format: hound::SampleFormat::Float,
-        };
-        let mut writer = hound::WavWriter::new(to, spec)?;
-        for value in self.evenly(rate_hz.into()) {
-            writer.write_sample(value)?;
-        }
-        writer.finalize()
+    /// Between samples that follow each other a polynomial of third degree runs through the four around (a straight
+    /// line beside a gap). Starts at the first sample and ends at the last.
+    pub fn evenly(&self, rate_hz: f64) -> impl Iterator<Item = Option<f64>> {
+        let mut known = self.samples().filter_map(|s| Some((s.t_s, s.d_px?.0)));
+        let mut around = [None, known.next(), known.next(), known.next()];
+        let start_s = around[1].map_or(0.0, |first: Point| first.0);
+        (0_u64..).map_while(move |k| {
+            let t_s = start_s + k as f64 / rate_hz;
+            while around[2].is_some_and(|after| after.0 < t_s) {
+                around.rotate_left(1);
+                around[3] = known.next();
+            }
+            between(&around, t_s, 1.0 / rate_hz)
+        })
     }
+}
+
+/// Time, s, and displacement, px.
+type Point = (f64, f64);
+
+/// The value at `t_s`, which lies between the middle two of four points; `Some(None)` in a gap, `None` after the end.
+fn between(around: &[Option<Point>; 4], t_s: f64, period_s: f64) -> Option<Option<f64>> {
+    let near = |a: Point, b: Point| b.0 - a.0 < 1.5 * period_s;
+    let is_at = |a: Point| (t_s - a.0).abs() < 0.05 * period_s;
+    match *around {
+        [_, Some(b), ..] if is_at(b) => Some(Some(b.1)),
+        [a, Some(b), Some(c), d] if near(b, c) => match (a, d) {
+            (Some(a), Some(d)) if near(a, b) && near(c, d) => Some(Some(cubic([a, b, c, d], t_s))),
+            _ => Some(Some(b.1 + (t_s - b.0) / (c.0 - b.0) * (c.1 - b.1))),
+        },
+        [_, _, Some(c), _] if is_at(c) => Some(Some(c.1)),
+        [_, Some(_), Some(_), _] => Some(None),
+        _ => None,
+    }
+}
+
+/// Lagrange's polynomial through four points.
+fn cubic(points: [Point; 4], t_s: f64) -> f64 {
+    (0..4)
+        .map(|i| {
+            let share: f64 = (0..4)
+                .filter(|&j| j != i)
+                .map(|j| (t_s - points[j].0) / (points[i].0 - points[j].0))
+                .product();
+            share * points[i].1
+        })
+        .sum()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::restore::{Method, fill};
 
     /// Two slots, three frames; slot 1 of frame 1 was not measured.
     fn series() -> Series {
@@ -268,8 +285,40 @@ mod tests {
 
     #[test]
     fn gaps_are_bridged_by_straight_lines() {
-        let even = series().evenly(4.0);
+        let even: Vec<Option<f64>> = series().evenly(4.0).collect();
+        assert_eq!(even[3], None);
+        let even = fill(&even, Method::Linear);
         assert_eq!(even, [-1.0, -1.0, 0.0, 0.5, 1.0, 1.0]);
-        assert!(Series::new(0, 1, 1).evenly(8000.0).is_empty());
+        assert_eq!(Series::new(0, 1, 1).evenly(8000.0).count(), 0);
+    }
+
+    #[test]
+    fn a_tone_on_another_grid_is_the_tone() {
+        // 40 samples of 0.4 ms in every 20 ms, read at 2.5 kHz and a little: the grids drift against each other.
+        let tone = |t: f64| (std::f64::consts::TAU * 100.0 * t).sin();
+        let mut series = Series::new(0, 1, 40);
+        for frame in 0..10 {
+            let samples: Vec<Measured> = (0..40)
+                .map(|k| Measured {
+                    after_s: 4e-4 * k as f32,
+                    shift: Some(Shift {
+                        px: tone(0.02 * f64::from(frame) + 4e-4 * f64::from(k)) as f32,
+                        information_per_px2: 1.0,
+                    }),
+                })
+                .collect();
+            series.push_frame(i64::from(frame) * 20_000_000, &samples);
+        }
+        let even: Vec<Option<f64>> = series.evenly(2513.0).collect();
+        let missing = even.iter().filter(|v| v.is_none()).count();
+        // 10 of 50 are blank, and up to two grid points a frame beside them.
+        assert!((9 * 10..=9 * 12).contains(&missing), "{missing}");
+        for (k, value) in even.iter().enumerate() {
+            if let Some(value) = value {
+                // At the edge of a gap a sample up to 5 % of a period away is taken as it is: 2π·100·0.05/2513.
+                let error = value - tone(k as f64 / 2513.0);
+                assert!(error.abs() < 0.0126, "{k}: {error}");
+            }
+        }
     }
 }

@@ -11,13 +11,17 @@
 //! | [`ar`] | autoregressive model of the signal itself (Janssen, Veldhuis and Vries 1986) |
 //! | [`tones`] | tones fitted to the samples that exist |
 //! | [`butterworth`] | the low-pass that follows |
+//! | [`long`] | both on a signal of any length, as `displacement --format wav` does |
+//! | [`agreement`] | gain, delay and signal-to-noise ratio against the truth |
 //! | [`sounds`], [`table`] | speech and music, and how well each method recovers them |
 
 use std::fmt;
 use std::str::FromStr;
 
+pub mod agreement;
 pub mod ar;
 pub mod butterworth;
+pub mod long;
 pub mod simple;
 pub mod sounds;
 pub mod table;

@@ -103,7 +103,7 @@ fn espeak() -> Option<Vec<f64>> {
 }
 
 /// Vowels (pulses through three resonances) with a gliding pitch, pauses and hiss between them.
-fn vowels() -> Vec<f64> {
+pub fn vowels() -> Vec<f64> {
     let formants = [
         [730.0, 1090.0, 2440.0],
         [270.0, 2290.0, 3010.0],
