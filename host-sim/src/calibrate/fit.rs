@@ -2,7 +2,7 @@
 //!
 //! b and g are linear and are eliminated inside each step (variable projection, Golub and Pereyra 1973, in
 //! Kaufman's form); the rest is Levenberg–Marquardt. The standard deviation of ν comes from what the residuals
-//! do ([`super::uncertainty`]), not from assuming them white.
+//! do (`uncertainty.rs`), not from assuming them white.
 
 use super::model::{Background, Model, legendre};
 use super::uncertainty;
