@@ -1,8 +1,9 @@
 //! Two-dimensional Fourier transforms of pictures of any size.
 
-use rustfft::FftPlanner;
 pub use rustfft::num_complex::Complex;
+use rustfft::{Fft, FftDirection, FftPlanner};
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
 /// A complex number.
 pub type C = Complex<f64>;
@@ -13,7 +14,8 @@ pub struct Plane {
     pub width: usize,
     /// Rows.
     pub height: usize,
-    planner: std::cell::RefCell<FftPlanner<f64>>,
+    /// Across and down, forwards, then inverse.
+    plans: [[Arc<dyn Fft<f64>>; 2]; 2],
 }
 
 impl std::fmt::Debug for Plane {
@@ -25,21 +27,28 @@ impl std::fmt::Debug for Plane {
 impl Plane {
     /// For pictures of this size.
     pub fn new(width: usize, height: usize) -> Self {
+        let mut planner = FftPlanner::new();
+        let mut plans = |direction| [width, height].map(|size| planner.plan_fft(size, direction));
+        let plans = [FftDirection::Forward, FftDirection::Inverse].map(&mut plans);
         Self {
             width,
             height,
-            planner: FftPlanner::new().into(),
+            plans,
         }
     }
 
     /// Spectrum of a real picture, not scaled.
     pub fn forward(&self, picture: &[f64]) -> Vec<C> {
-        let mut data: Vec<C> = picture.iter().map(|&v| C::new(v, 0.0)).collect();
-        self.run(&mut data, true);
-        data
+        self.forward_complex(picture.iter().map(|&v| C::new(v, 0.0)).collect())
     }
 
-    /// The picture of a spectrum, scaled so that it undoes [`Self::forward`].
+    /// Spectrum of a complex picture, not scaled.
+    pub fn forward_complex(&self, mut picture: Vec<C>) -> Vec<C> {
+        self.run(&mut picture, true);
+        picture
+    }
+
+    /// The complex picture of a spectrum, scaled so that it undoes [`Self::forward`].
     pub fn inverse(&self, mut spectrum: Vec<C>) -> Vec<C> {
         self.run(&mut spectrum, false);
         let scale = 1.0 / spectrum.len().max(1) as f64;
@@ -48,19 +57,17 @@ impl Plane {
     }
 
     fn run(&self, data: &mut Vec<C>, forward: bool) {
-        let mut planner = self.planner.borrow_mut();
-        let mut plan = |size| {
-            if forward {
-                planner.plan_fft_forward(size)
-            } else {
-                planner.plan_fft_inverse(size)
-            }
-        };
-        let (across, down) = (plan(self.width), plan(self.height));
+        let [across, down] = &self.plans[usize::from(!forward)];
         across.process(data);
         let mut turned = transposed(data, self.width, self.height);
         down.process(&mut turned);
         *data = transposed(&turned, self.height, self.width);
+    }
+
+    /// The bin of the opposite frequency.
+    pub fn mirror(&self, bin: usize) -> usize {
+        let (x, y) = (bin % self.width, bin / self.width);
+        (self.height - y) % self.height * self.width + (self.width - x) % self.width
     }
 
     /// Frequencies (across, down) of a bin, radians a pixel, −π to π.
@@ -83,10 +90,16 @@ fn wrapped(k: usize, size: usize) -> f64 {
 }
 
 fn transposed(data: &[C], width: usize, height: usize) -> Vec<C> {
+    // In tiles, so that both pictures stay in the cache.
+    const TILE: usize = 32;
     let mut out = vec![C::new(0.0, 0.0); data.len()];
-    for y in 0..height {
-        for x in 0..width {
-            out[x * height + y] = data[y * width + x];
+    for top in (0..height).step_by(TILE) {
+        for left in (0..width).step_by(TILE) {
+            for y in top..(top + TILE).min(height) {
+                for x in left..(left + TILE).min(width) {
+                    out[x * height + y] = data[y * width + x];
+                }
+            }
         }
     }
     out

@@ -7,13 +7,16 @@
 //! | --- | --- |
 //! | [`shearlet`] | the cone-adapted complex shearlet pyramid |
 //! | [`thesis`] | the thesis's pipeline on it: Algorithms 1 and 2, Foroosh's peak |
-//! | [`steerable`] | the complex steerable pyramid and the Visual Microphone on it |
+//! | [`steerable`] | the complex steerable pyramid |
+//! | [`visual`] | the Visual Microphone on it, row by row and frame by frame |
+//! | [`bank`] | what both pyramids are: windows that are a tight frame |
 //! | [`classical`] | the small ones, one function each |
 //! | [`core`] | this project's own line engine |
 //! | [`correlate`] | one-dimensional phase correlation and its sub-pixel peaks |
 //! | [`fourier`] | two-dimensional transforms |
 //! | [`study`], [`sweep`] | simulated recordings, scores, the thesis's single tones |
 
+pub mod bank;
 pub mod classical;
 pub mod core;
 pub mod correlate;
@@ -23,6 +26,7 @@ pub mod steerable;
 pub mod study;
 pub mod sweep;
 pub mod thesis;
+pub mod visual;
 
 /// A clip in memory.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -70,7 +74,12 @@ pub fn all() -> Vec<Box<dyn Method>> {
     let mut methods: Vec<Box<dyn Method>> = vec![
         Box::new(thesis::Thesis::default()),
         Box::new(thesis::Thesis::coarse()),
-        Box::new(steerable::VisualMicrophone),
+        Box::new(visual::VisualMicrophone {
+            by: visual::By::Row,
+        }),
+        Box::new(visual::VisualMicrophone {
+            by: visual::By::Frame,
+        }),
     ];
     methods.extend(
         classical::Classical::ALL

@@ -1,100 +1,134 @@
-//! The Visual Microphone (Davis et al. 2014) on a complex steerable pyramid (Simoncelli and Freeman 1995; Portilla
-//! and Simoncelli 2000): phase against the first frame, weighted by squared amplitude, sub-bands aligned and summed.
+//! The complex steerable pyramid (Simoncelli and Freeman 1995; Portilla and Simoncelli 2000), undecimated.
 //!
-//! Row by row for a rolling shutter. The original sums phases in radians, whose scale depends on the texture; here
-//! each sub-band's phase is divided by its own frequency across (in its energy's middle), so the result is in px.
+//! Octaves by radius, orientations by cos θ, of which only the half that looks forwards is kept, so that coefficients
+//! are complex; a high-pass rest in the corners and a low-pass rest in the middle.
 
-use super::fourier::{C, Plane};
-use super::thesis::align_and_sum;
-use super::{Clip, Method, Shifts};
-use std::f64::consts::{FRAC_PI_2, PI};
+use super::bank::{Bank, bump};
+use super::fourier::Plane;
+use std::f64::consts::PI;
 
-/// Scales of the pyramid.
-const SCALES: usize = 4;
-/// Orientations: across and down.
-const ORIENTATIONS: usize = 2;
+/// Scales of the Visual Microphone's pyramid.
+pub const SCALES: usize = 4;
+/// Its orientations: across and down.
+pub const ORIENTATIONS: usize = 2;
 
-/// The Visual Microphone.
-#[derive(Clone, Copy, Debug)]
-pub struct VisualMicrophone;
+/// One sub-band.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Band {
+    /// 0 is the finest.
+    pub scale: usize,
+    /// Direction in which it looks, rad from across to down.
+    pub angle: f64,
+}
 
-impl Method for VisualMicrophone {
-    fn name(&self) -> &'static str {
-        "Visual Microphone"
-    }
+/// All sub-bands for one picture size.
+#[derive(Debug)]
+pub struct Pyramid {
+    /// Sub-bands, finest first.
+    pub bands: Vec<Band>,
+    /// Their windows, in the same order; high-pass and low-pass rest.
+    pub bank: Bank,
+}
 
-    fn shifts(&self, clip: &Clip) -> Shifts {
-        let plane = Plane::new(clip.width, clip.height);
-        let spectra: Vec<Vec<C>> = clip.frames.iter().map(|f| plane.forward(f)).collect();
-        let mut signals = Vec::new();
-        for scale in 0..SCALES {
-            for orientation in 0..ORIENTATIONS {
-                let window = window(&plane, scale, orientation);
-                let across = mean_frequency(&plane, &spectra[0], &window);
-                // Down: what moves sideways does not show there.
-                if across < 1e-2 {
-                    continue;
-                }
-                signals.push(row_phases(&plane, &spectra, &window, across));
-            }
+impl Pyramid {
+    /// For pictures of this size.
+    pub fn new(width: usize, height: usize, scales: usize, orientations: usize) -> Self {
+        let plane = Plane::new(width, height);
+        let frequencies: Vec<(f64, f64)> =
+            (0..width * height).map(|b| plane.frequency(b)).collect();
+        let mut bands = Vec::new();
+        for scale in 0..scales {
+            bands.extend((0..orientations).map(|k| Band {
+                scale,
+                angle: PI * k as f64 / orientations as f64,
+            }));
         }
-        align_and_sum(signals)
-    }
-}
-
-/// One-sided window of an octave and an orientation (cos θ, its other half cut off).
-fn window(plane: &Plane, scale: usize, orientation: usize) -> Vec<f64> {
-    (0..plane.width * plane.height)
-        .map(|bin| {
-            let (x, y) = plane.frequency(bin);
-            let radius = x.hypot(y);
-            if radius == 0.0 {
-                return 0.0;
-            }
-            let octave = (radius / PI).log2() + 0.5 + scale as f64;
-            let radial = if octave.abs() < 1.0 {
-                (FRAC_PI_2 * octave).cos()
-            } else {
-                0.0
-            };
-            let angle = y.atan2(x) - PI * orientation as f64 / ORIENTATIONS as f64;
-            radial * angle.cos().max(0.0)
-        })
-        .collect()
-}
-
-/// Frequency across that a shift turns this band's phase by, rad/px, by energy.
-fn mean_frequency(plane: &Plane, spectrum: &[C], window: &[f64]) -> f64 {
-    let (mut sum, mut weight) = (0.0, 1e-300);
-    for (bin, (s, w)) in spectrum.iter().zip(window).enumerate() {
-        let energy = s.norm_sqr() * w * w;
-        sum += energy * plane.frequency(bin).0;
-        weight += energy;
-    }
-    sum / weight
-}
-
-/// Mean phase of each row against the first frame, weighted by squared amplitude, in px.
-fn row_phases(plane: &Plane, spectra: &[Vec<C>], window: &[f64], across: f64) -> Shifts {
-    let band = |s: &Vec<C>| plane.inverse(s.iter().zip(window).map(|(s, w)| s * w).collect());
-    let reference = band(&spectra[0]);
-    spectra
-        .iter()
-        .map(|spectrum| {
-            band(spectrum)
-                .chunks_exact(plane.width)
-                .zip(reference.chunks_exact(plane.width))
-                .map(|(row, reference)| {
-                    let (mut sum, mut weight) = (0.0, 1e-300);
-                    for (c, r) in row.iter().zip(reference) {
-                        let amplitude = c.norm_sqr();
-                        sum += amplitude * (c * r.conj()).arg();
-                        weight += amplitude;
-                    }
-                    // A shift to the right turns phases back.
-                    -sum / weight / across
+        let by_bin =
+            |window: &dyn Fn((f64, f64)) -> f64| frequencies.iter().map(|&f| window(f)).collect();
+        let windows = bands
+            .iter()
+            .map(|band| {
+                by_bin(&|(x, y)| {
+                    let turn = (y.atan2(x) - band.angle).cos().max(0.0);
+                    bump(octave(x, y) + band.scale as f64) * turn.powi(orientations as i32 - 1)
                 })
-                .collect()
-        })
-        .collect()
+            })
+            .collect();
+        let high = by_bin(&|(x, y)| side(octave(x, y)));
+        let low = by_bin(&|(x, y)| side(-(octave(x, y) + scales as f64 - 1.0)));
+        Self {
+            bank: Bank::new(plane, windows, vec![high, low]),
+            bands,
+        }
+    }
+}
+
+/// Octaves above the middle of the finest scale, π/√2.
+fn octave(x: f64, y: f64) -> f64 {
+    (x.hypot(y) / PI).log2() + 0.5
+}
+
+/// What is left above 0: rises with the bump's falling side, one from 1 on.
+fn side(u: f64) -> f64 {
+    if u >= 1.0 {
+        1.0
+    } else if u > 0.0 {
+        bump(u - 1.0)
+    } else {
+        0.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::bank::tests::{shares, tightness, wave};
+    use super::*;
+
+    #[test]
+    fn the_frame_is_tight_at_any_size() {
+        for (width, height) in [(48, 36), (65, 131), (104, 64)] {
+            let pyramid = Pyramid::new(width, height, SCALES, ORIENTATIONS);
+            let (error, energy) = tightness(&pyramid.bank);
+            assert!(
+                error < 1e-12 && energy < 1e-12,
+                "{width}x{height}: {error} {energy}"
+            );
+        }
+    }
+
+    /// Orientations take cos² and sin² of a wave's energy, wherever it looks: it is steerable.
+    #[test]
+    fn a_turned_wave_is_shared_by_its_angle() {
+        let size = 96;
+        let pyramid = Pyramid::new(size, size, SCALES, ORIENTATIONS);
+        for (across, down) in [
+            (12.0, 0.0),
+            (12.0, 5.0),
+            (9.0, 9.0),
+            (4.0, 12.0),
+            (0.0, 12.0),
+        ] {
+            let shares = shares(&pyramid.bank, &wave(size, size, across, down));
+            let bands = pyramid.bands.iter().zip(shares);
+            let first: f64 = bands.filter(|(b, _)| b.angle == 0.0).map(|(_, s)| s).sum();
+            let expected = across * across / (across * across + down * down);
+            assert!((first - expected).abs() < 1e-9, "{across} {down}: {first}");
+        }
+    }
+
+    #[test]
+    fn a_wave_lands_in_its_octave() {
+        let size = 128;
+        let pyramid = Pyramid::new(size, size, SCALES, ORIENTATIONS);
+        for scale in 0..SCALES {
+            let periods = (64.0 / f64::powf(2.0, scale as f64 + 0.5)).round();
+            let shares = shares(&pyramid.bank, &wave(size, size, periods, 0.0));
+            let bands = pyramid.bands.iter().zip(shares);
+            let own: f64 = bands
+                .filter(|(b, _)| b.scale == scale)
+                .map(|(_, s)| s)
+                .sum();
+            assert!(own > 0.98, "scale {scale}: {own}");
+        }
+    }
 }

@@ -3,9 +3,9 @@
 use std::fmt::Write;
 
 use super::core::Core;
-use super::steerable::VisualMicrophone;
 use super::study::{Fit, record};
 use super::thesis::Thesis;
+use super::visual::{By, VisualMicrophone};
 use super::{Method, remove_row_means};
 use crate::sim::{Config, Preset, SimError, Tone};
 use rowtone::camera::Timing;
@@ -28,7 +28,7 @@ fn methods(timing: Timing, fps: f64) -> Vec<Box<dyn Method>> {
             bits: 8,
         }),
         Box::new(Thesis::default()),
-        Box::new(VisualMicrophone),
+        Box::new(VisualMicrophone { by: By::Row }),
     ]
 }
 

@@ -57,29 +57,37 @@ impl Method for Thesis {
 
     fn shifts(&self, clip: &Clip) -> Shifts {
         let pyramid = Pyramid::new(clip.width, clip.height, &self.directions);
-        let spectra: Vec<Vec<C>> = clip.frames.iter().map(|f| pyramid.spectrum(f)).collect();
-        let used: Vec<usize> = (0..pyramid.bands.len())
-            .filter(|&b| {
-                pyramid.bands[b].cone == Cone::Horizontal
-                    && self.scales.contains(&pyramid.bands[b].scale)
-            })
-            .collect();
-        let signals: Vec<Shifts> = used
+        let spectra: Vec<Vec<C>> = clip
+            .frames
             .iter()
-            .map(|&band| {
+            .map(|f| pyramid.bank.spectrum(f))
+            .collect();
+        let signals = self
+            .used(&pyramid)
+            .map(|band| {
                 let phases: Vec<Vec<C>> = spectra
                     .iter()
-                    .map(|s| unit(pyramid.band(s, band)))
+                    .map(|s| unit(pyramid.bank.band(s, band)))
                     .collect();
-                correlate_rows(&phases, clip.width, clip.height)
+                correlate_rows(&phases, &reference_phase(&phases), clip.width)
             })
             .collect();
         align_and_sum(signals)
     }
 }
 
+impl Thesis {
+    /// Sub-bands of the horizontal cone in the scales that are used.
+    pub fn used(&self, pyramid: &Pyramid) -> impl Iterator<Item = usize> {
+        (0..pyramid.bands.len()).filter(|&b| {
+            let band = pyramid.bands[b];
+            band.cone == Cone::Horizontal && self.scales.contains(&band.scale)
+        })
+    }
+}
+
 /// Only the phase, as unit vectors.
-fn unit(coefficients: Vec<C>) -> Vec<C> {
+pub fn unit(coefficients: Vec<C>) -> Vec<C> {
     coefficients
         .into_iter()
         .map(|c| {
@@ -93,13 +101,17 @@ fn unit(coefficients: Vec<C>) -> Vec<C> {
         .collect()
 }
 
-/// Algorithm 1 and the correlation: shift of every row against the mean phase.
-fn correlate_rows(phases: &[Vec<C>], width: usize, height: usize) -> Shifts {
-    let mut reference = vec![C::new(0.0, 0.0); width * height];
+/// Algorithm 1: the mean phase of all frames.
+pub fn reference_phase(phases: &[Vec<C>]) -> Vec<C> {
+    let mut sum = vec![C::new(0.0, 0.0); phases.first().map_or(0, Vec::len)];
     for frame in phases {
-        reference.iter_mut().zip(frame).for_each(|(r, p)| *r += p);
+        sum.iter_mut().zip(frame).for_each(|(r, p)| *r += p);
     }
-    let reference = unit(reference);
+    unit(sum)
+}
+
+/// Shift of every row of phases against the reference's, px.
+pub fn correlate_rows(phases: &[Vec<C>], reference: &[C], width: usize) -> Shifts {
     let correlation = PhaseCorrelation::new(width);
     let rows = |frame: &[C]| -> Vec<Vec<C>> {
         frame
@@ -107,7 +119,7 @@ fn correlate_rows(phases: &[Vec<C>], width: usize, height: usize) -> Shifts {
             .map(|r| correlation.spectrum(r))
             .collect()
     };
-    let references = rows(&reference);
+    let references = rows(reference);
     phases
         .iter()
         .map(|frame| {
@@ -145,8 +157,9 @@ pub fn align_and_sum(mut signals: Vec<Shifts>) -> Shifts {
     let lead = (0..flat.len())
         .max_by(|&a, &b| agreement(&flat[a]).total_cmp(&agreement(&flat[b])))
         .unwrap_or(0);
+    let furthest = FURTHEST.min(first.len() as isize / 8);
     for signal in &flat {
-        let best = (-FURTHEST..=FURTHEST)
+        let best = (-furthest..=furthest)
             .max_by(|&a, &b| {
                 shifted_product(&flat[lead], signal, a).total_cmp(&shifted_product(
                     &flat[lead],
@@ -197,5 +210,59 @@ mod tests {
             .map(|y| (joined[2][y] - truth[2][y]).abs())
             .fold(0.0, f64::max);
         assert!(error < 0.02, "{error}");
+    }
+
+    /// The 15 pixels of Fig. 5.8: every sub-band of the horizontal cone tells them, row by row, where the phase of a
+    /// sub-band as such has long turned round.
+    #[test]
+    fn fifteen_pixels_are_told_by_every_sub_band() {
+        let (width, height, by) = (96, 48, 15);
+        let picture = super::super::bank::tests::noise(width * height);
+        let moved: Vec<f64> = (0..width * height)
+            .map(|i| picture[i / width * width + (i % width + width - by) % width])
+            .collect();
+        let pyramid = Pyramid::new(width, height, &DIRECTIONS);
+        let [home, moved] = [picture, moved].map(|p| pyramid.bank.spectrum(&p));
+        let used: Vec<usize> = Thesis::default().used(&pyramid).collect();
+        assert_eq!(used.len(), 16);
+        for band in used {
+            let [home, moved] = [&home, &moved].map(|s| unit(pyramid.bank.band(s, band)));
+            let shifts = correlate_rows(&[moved], &home, width);
+            // Coarse rows' phases are so smooth that some frequencies hold nothing but rounding.
+            for (y, shift) in shifts[0].iter().enumerate() {
+                assert!(
+                    (shift - by as f64).abs() < 0.3,
+                    "band {band}, row {y}: {shift}"
+                );
+            }
+            let mean = shifts[0].iter().sum::<f64>() / height as f64;
+            assert!((mean - by as f64).abs() < 0.03, "band {band}: {mean}");
+        }
+    }
+
+    /// Algorithm 1: phases wrap, so their mean is that of unit vectors.
+    #[test]
+    fn the_reference_is_the_mean_around_the_circle() {
+        let turned = |a: f64| vec![C::from_polar(1.0, a)];
+        let mean = reference_phase(&[turned(3.1), turned(-3.1), turned(3.1), turned(-3.1)]);
+        assert!((mean[0].arg().abs() - std::f64::consts::PI).abs() < 1e-9);
+        assert!(reference_phase(&[]).is_empty());
+    }
+
+    /// A tone of half a pixel through the simulated camera.
+    #[test]
+    fn a_tone_is_heard() {
+        use crate::methods::study::{record, score};
+        let mut config = crate::sim::Config::default();
+        (config.sensor.cols, config.sensor.rows, config.frames) = (96, 100, 8);
+        config.sensor.line_time_ps = 100_000_000;
+        config.motion.tones.push(crate::sim::Tone {
+            hz: 83.0,
+            amplitude_px: 0.5,
+            phase_rad: 0.4,
+        });
+        let score = score(&Thesis::coarse(), &record(config).unwrap(), 83.0);
+        assert!(score.amplitude_error.abs() < 0.35, "{score:?}");
+        assert!(score.hz_error.is_some_and(|e| e.abs() < 2.0), "{score:?}");
     }
 }
