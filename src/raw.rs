@@ -21,8 +21,11 @@
 //! # Ok::<(), rowtone::raw::RawError>(())
 //! ```
 
+mod upper;
+
+pub use upper::UpperBytes;
+
 use crate::camera::Pixels;
-use crate::kernel::{Kernel, gather};
 use core::fmt;
 
 /// How the pixels of a raw line lie in memory.
@@ -131,67 +134,6 @@ impl RawFormat {
     }
 }
 
-/// Bytes behind a line that [`RawFormat::upper_line`] likes to have.
-pub const UPPER_SPARE: usize = 16;
-
-impl RawFormat {
-    /// The first `width` pixels of a line, of each its upper eight bits: half the bytes to work on, and packed
-    /// pixels need no unpacking, their upper bytes lie side by side. 8-bit pixels stay where they are, others are
-    /// copied to `upper`, which is best [`UPPER_SPARE`] longer than the line (and written to the end then), so that
-    /// whole vectors can be written. What is cut off is worth a rounding noise of 0.29 of an eight-bit step, well below the
-    /// light's own noise unless the picture is dark.
-    ///
-    /// ```
-    /// use rowtone::{camera::Pixels, kernel::Kernel, raw::RawFormat};
-    ///
-    /// let bytes = [0x80, 0x00, 0xff, 0x01, 0b11_10_01_00]; // four pixels of 10 bits
-    /// let mut upper = [0; 4];
-    /// let line = RawFormat::Packed10.upper_line(Kernel::detect(), &bytes, 4, &mut upper)?;
-    /// assert_eq!(line, Pixels::U8(&[0x80, 0x00, 0xff, 0x01]));
-    /// # Ok::<(), rowtone::raw::RawError>(())
-    /// ```
-    ///
-    /// # Errors
-    /// [`RawError`] when the line or the bytes lent are too few.
-    #[inline]
-    pub fn upper_line<'a>(
-        self,
-        kernel: Kernel,
-        bytes: &'a [u8],
-        width: usize,
-        upper: &'a mut [u8],
-    ) -> Result<Pixels<'a>, RawError> {
-        let needs = self.bytes(width);
-        let has = bytes.len();
-        let line = bytes.get(..needs).ok_or(RawError::Line { has, needs })?;
-        if self == Self::Raw8 {
-            return Ok(Pixels::U8(line));
-        }
-        let has = upper.len();
-        if has < width {
-            return Err(RawError::Words { has, needs: width });
-        }
-        let done = match self {
-            Self::Packed10 => kernel.gather(&gather::PACKED10, bytes, upper, width),
-            Self::Packed12 => kernel.gather(&gather::PACKED12, bytes, upper, width),
-            _ => 0,
-        };
-        let upper = upper.get_mut(..width).unwrap_or_default();
-        let from = line.get(self.bytes(done)..).unwrap_or_default();
-        let to = upper.get_mut(done..).unwrap_or_default();
-        let word = |w: &[u8; 2]| u16::from_le_bytes(*w);
-        match self {
-            Self::Raw8 => {}
-            Self::Packed10 => unpack(from, to, |&[a, b, c, d, _]: &[u8; 5]| [a, b, c, d]),
-            Self::Packed12 => unpack(from, to, |&[a, b, _]: &[u8; 3]| [a, b]),
-            Self::Raw10 => unpack(from, to, |w| [(word(w) >> 2) as u8]),
-            Self::Raw12 => unpack(from, to, |w| [(word(w) >> 4) as u8]),
-            Self::Raw16 => unpack(from, to, |w| [(word(w) >> 8) as u8]),
-        }
-        Ok(Pixels::U8(upper))
-    }
-}
-
 /// Unpacks groups of `BYTES` bytes into groups of `PIXELS` pixels; a last group may be needed in part.
 #[inline(always)]
 fn unpack<T: Copy, const BYTES: usize, const PIXELS: usize>(
@@ -249,7 +191,7 @@ mod tests {
     use std::{vec, vec::Vec};
 
     /// As the sensor packs them.
-    fn pack(format: RawFormat, pixels: &[u16]) -> Vec<u8> {
+    pub(super) fn pack(format: RawFormat, pixels: &[u16]) -> Vec<u8> {
         let at = |group: &[u16], i: usize| group.get(i).copied().unwrap_or(0);
         match format {
             RawFormat::Raw8 => pixels.iter().map(|&p| p as u8).collect(),
@@ -273,10 +215,7 @@ mod tests {
     }
 
     fn words(pixels: Pixels<'_>) -> Vec<u16> {
-        match pixels {
-            Pixels::U8(p) => p.iter().map(|&p| u16::from(p)).collect(),
-            Pixels::U16(p) => p.to_vec(),
-        }
+        pixels.values().collect()
     }
 
     proptest! {
@@ -293,23 +232,6 @@ mod tests {
             let mut buffer = vec![0xDEAD; pixels.len() + padding];
             let line = format.line(&bytes, pixels.len(), &mut buffer).unwrap();
             prop_assert_eq!(words(line), pixels);
-        }
-
-        #[test]
-        fn the_upper_bytes_are_those_of_the_pixels(
-            format in prop::sample::select(&RawFormat::ALL[..]),
-            pixels in prop::collection::vec(any::<u16>(), 0..70),
-            padding in 0usize..40,
-        ) {
-            let pixels: Vec<u16> = pixels.iter().map(|p| p >> (16 - format.bits())).collect();
-            let mut bytes = pack(format, &pixels);
-            bytes.resize(bytes.len() + padding, 0xA5);
-            let upper: Vec<u8> = pixels.iter().map(|p| (p >> (format.bits() - 8)) as u8).collect();
-            for kernel in Kernel::all() {
-                let mut buffer = vec![0xDE; pixels.len() + padding];
-                let line = format.upper_line(kernel, &bytes, pixels.len(), &mut buffer).unwrap();
-                prop_assert_eq!(line, Pixels::U8(&upper));
-            }
         }
 
         #[test]
@@ -335,10 +257,12 @@ mod tests {
             lent in 0usize..100,
         ) {
             let mut upper = vec![0; lent];
-            let upper = format.upper_line(Kernel::detect(), &bytes, width, &mut upper).map(|line| line.len());
+            let upper = format.upper_line(&bytes, width, &mut upper).map(|line| line.len());
             let mut buffer = vec![0; lent];
             let all = format.line(&bytes, width, &mut buffer).map(|line| line.len());
-            prop_assert_eq!(upper, all);
+            if !matches!(all, Err(RawError::Words { .. })) {
+                prop_assert_eq!(upper, all);
+            }
             match format.line(&bytes, width, &mut buffer) {
                 Ok(line) => prop_assert_eq!(line.len(), width),
                 Err(RawError::Line { has, needs }) => prop_assert!(has < needs),

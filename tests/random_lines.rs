@@ -7,6 +7,7 @@ use rowtone::analyzer::Analyzer;
 use rowtone::band::Level;
 use rowtone::camera::{Line, Pixels, Timing};
 use rowtone::kernel::Kernel;
+use rowtone::raw::RawFormat;
 use rowtone::reference::RowTable;
 use rowtone::spectrum::{self, StaticStorage};
 use rowtone::timeline::{Binner, Displacement, Group};
@@ -149,7 +150,7 @@ proptest! {
     fn no_line_makes_the_chain_panic(
         config in any_config(), looks in collection::vec(any_look(), 1..4),
         mask in any::<u8>(), seed in 1u64.., first_frame in prop_oneof![Just(0u32), any::<u32>()],
-        rows_per_sample in 1u16..8, wild in any::<bool>(),
+        rows_per_sample in 1u16..8, wild in any::<bool>(), scattered in any::<bool>(), room in 0usize..300,
     ) {
         let mut dice = Dice(seed);
         let (width, rows) = (usize::from(config.width), usize::from(config.rows));
@@ -159,7 +160,8 @@ proptest! {
             _ => 0,
         });
         let mut memory = Memory::new(width, rows, columns.collect());
-        let mut tracker = Tracker::new(config, memory.lend()).unwrap();
+        let mut room = vec![0; room];
+        let mut tracker = Tracker::new(config, memory.lend()).unwrap().with_line_room(&mut room);
         let timing = config.timing;
         let group = Group::new(timing, rows_per_sample.min(timing.rows())).unwrap();
         let mut binner = Binner::new(group);
@@ -179,8 +181,13 @@ proptest! {
                 let shorter = if wild && dice.below(50) == 0 { dice.below(width as u64) as usize } else { width };
                 let seen = match config.bits == 8 || wild && dice.below(4) == 0 {
                     true => {
-                        bytes = pixels[..shorter].iter().map(|&p| p as u8).collect();
-                        Pixels::U8(&bytes)
+                        let words = pixels[..shorter].iter();
+                        let format = [RawFormat::Raw8, RawFormat::Raw16][usize::from(scattered)];
+                        bytes = match format {
+                            RawFormat::Raw16 => words.flat_map(|&p| (p << 8).to_le_bytes()).collect(),
+                            _ => words.map(|&p| p as u8).collect(),
+                        };
+                        format.upper_line(&bytes, shorter, &mut []).unwrap()
                     }
                     false => Pixels::U16(&pixels[..shorter]),
                 };

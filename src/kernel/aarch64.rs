@@ -27,17 +27,17 @@ pub(super) fn has_dot_product() -> bool {
 }
 
 /// The sums of some steps, before the pixels' top bits are put back.
-struct Parts {
+pub(super) struct Parts {
     /// Σ h·(p − half).
-    product: i64,
+    pub(super) product: i64,
     /// Σ p.
-    pixels: u64,
+    pub(super) pixels: u64,
     /// Σ h.
-    coefficients: i64,
+    pub(super) coefficients: i64,
 }
 
 impl Parts {
-    fn sums(self, half: i64, rest: Sums) -> Sums {
+    pub(super) fn sums(self, half: i64, rest: Sums) -> Sums {
         Sums {
             product: self.product + half * self.coefficients + rest.product,
             pixels: self.pixels + rest.pixels,
@@ -77,20 +77,20 @@ fn load_u8(bytes: &[u8; 16]) -> uint8x16_t {
 }
 
 #[target_feature(enable = "neon")]
-fn load_i8(bytes: &[i8; 16]) -> int8x16_t {
+pub(super) fn load_i8(bytes: &[i8; 16]) -> int8x16_t {
     // SAFETY: the array is 16 bytes long and the load needs no alignment.
     unsafe { vld1q_s8(bytes.as_ptr()) }
 }
 
 /// p − 128 as signed bytes.
 #[target_feature(enable = "neon")]
-fn centred(p: uint8x16_t) -> int8x16_t {
+pub(super) fn centred(p: uint8x16_t) -> int8x16_t {
     vreinterpretq_s8_u8(veorq_u8(p, vdupq_n_u8(0x80)))
 }
 
 /// `sum` + products of four neighbouring bytes each (the intrinsic is not stable yet).
 #[target_feature(enable = "neon,dotprod")]
-fn dot_i8(mut sum: int32x4_t, a: int8x16_t, b: int8x16_t) -> int32x4_t {
+pub(super) fn dot_i8(mut sum: int32x4_t, a: int8x16_t, b: int8x16_t) -> int32x4_t {
     // SAFETY: registers only; the instruction is there, the function is compiled for it.
     unsafe {
         asm!("sdot {0:v}.4s, {1:v}.16b, {2:v}.16b", inout(vreg) sum, in(vreg) a, in(vreg) b,
@@ -101,7 +101,7 @@ fn dot_i8(mut sum: int32x4_t, a: int8x16_t, b: int8x16_t) -> int32x4_t {
 
 /// As [`dot_i8`], unsigned.
 #[target_feature(enable = "neon,dotprod")]
-fn dot_u8(mut sum: uint32x4_t, a: uint8x16_t, b: uint8x16_t) -> uint32x4_t {
+pub(super) fn dot_u8(mut sum: uint32x4_t, a: uint8x16_t, b: uint8x16_t) -> uint32x4_t {
     // SAFETY: registers only; the instruction is there, the function is compiled for it.
     unsafe {
         asm!("udot {0:v}.4s, {1:v}.16b, {2:v}.16b", inout(vreg) sum, in(vreg) a, in(vreg) b,

@@ -10,8 +10,8 @@
 mod aarch64;
 #[cfg(all(target_arch = "arm", any(target_feature = "dsp", rowtone_dsp)))]
 mod cortex_m;
-pub(crate) mod gather;
 mod portable;
+pub(crate) mod spread;
 #[cfg(target_arch = "x86_64")]
 mod x86_64;
 #[cfg(target_arch = "x86_64")]
@@ -66,7 +66,10 @@ enum Kind {
     Avx2,
     /// x86-64 with AVX-512 and VNNI: 64 pixels a step.
     #[cfg(target_arch = "x86_64")]
-    Avx512,
+    Avx512 {
+        /// Byte permutations (VBMI) besides.
+        vbmi: bool,
+    },
     /// 64-bit Arm: 16 pixels a step.
     #[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
     Neon,
@@ -88,7 +91,8 @@ impl Kernel {
     fn fastest() -> Kind {
         let features = x86_64::Features::detect();
         if features.avx512_vnni {
-            Kind::Avx512
+            let vbmi = features.avx512_vbmi;
+            Kind::Avx512 { vbmi }
         } else if features.avx2 {
             Kind::Avx2
         } else {
@@ -128,7 +132,9 @@ impl Kernel {
             #[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
             Some(Kind::Neon),
             #[cfg(target_arch = "x86_64")]
-            (best == Kind::Avx512).then_some(Kind::Avx2),
+            matches!(best, Kind::Avx512 { .. }).then_some(Kind::Avx2),
+            #[cfg(target_arch = "x86_64")]
+            (best == Kind::Avx512 { vbmi: true }).then_some(Kind::Avx512 { vbmi: false }),
         ];
         let better = (!slower.contains(&Some(best))).then_some(best);
         slower.into_iter().flatten().chain(better).map(Self)
@@ -141,7 +147,7 @@ impl Kernel {
         match self.0 {
             // SAFETY: `fastest` made these kinds after it asked the processor for AVX2.
             #[cfg(target_arch = "x86_64")]
-            Kind::Avx2 | Kind::Avx512 => unsafe { x86_64::run(wide) },
+            Kind::Avx2 | Kind::Avx512 { .. } => unsafe { x86_64::run(wide) },
             _ => wide.run(),
         }
     }
@@ -159,7 +165,7 @@ impl Kernel {
             Kind::Avx2 => unsafe { x86_64::sums_u8(pixels, coefficients) },
             // SAFETY: `fastest` made this kind after it asked for all of AVX-512 that these need.
             #[cfg(target_arch = "x86_64")]
-            Kind::Avx512 => unsafe { x86_64_avx512::sums_u8(pixels, coefficients) },
+            Kind::Avx512 { .. } => unsafe { x86_64_avx512::sums_u8(pixels, coefficients) },
             // SAFETY: the program was compiled for processors with NEON.
             #[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
             Kind::Neon => unsafe { aarch64::sums_u8(pixels, coefficients) },
@@ -182,7 +188,7 @@ impl Kernel {
             Kind::Avx2 => unsafe { x86_64::sums_u16(pixels, coefficients) },
             // SAFETY: as for `sums_u8`.
             #[cfg(target_arch = "x86_64")]
-            Kind::Avx512 => unsafe { x86_64_avx512::sums_u16(pixels, coefficients) },
+            Kind::Avx512 { .. } => unsafe { x86_64_avx512::sums_u16(pixels, coefficients) },
             // SAFETY: as for `sums_u8`.
             #[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
             Kind::Neon | Kind::NeonDot => unsafe { aarch64::sums_u16(pixels, coefficients) },

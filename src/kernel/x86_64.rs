@@ -10,6 +10,8 @@ pub(super) struct Features {
     pub(super) avx2: bool,
     /// AVX-512 F, BW, VL and VNNI.
     pub(super) avx512_vnni: bool,
+    /// VBMI besides.
+    pub(super) avx512_vbmi: bool,
 }
 
 impl Features {
@@ -25,10 +27,12 @@ impl Features {
         let has = |register: u32, bits: &[u32]| bits.iter().all(|&bit| register & (1 << bit) != 0);
         // XMM and YMM; then also the masks and both halves of ZMM.
         let (avx2, zmm) = (saved & 0x06 == 0x06, saved & 0xe6 == 0xe6);
+        // F, BW, VL; VNNI.
+        let avx512_vnni = zmm && has(leaf7.ebx, &[5, 16, 30, 31]) && has(leaf7.ecx, &[11]);
         Self {
             avx2: avx2 && has(leaf7.ebx, &[5]),
-            // F, BW, VL; VNNI.
-            avx512_vnni: zmm && has(leaf7.ebx, &[5, 16, 30, 31]) && has(leaf7.ecx, &[11]),
+            avx512_vnni,
+            avx512_vbmi: avx512_vnni && has(leaf7.ecx, &[1]),
         }
     }
 }
@@ -40,7 +44,7 @@ fn xgetbv() -> u64 {
 }
 
 #[target_feature(enable = "avx2")]
-fn sum_i32(v: __m256i) -> i64 {
+pub(super) fn sum_i32(v: __m256i) -> i64 {
     let v = _mm_add_epi32(_mm256_castsi256_si128(v), _mm256_extracti128_si256::<1>(v));
     let v = _mm_add_epi32(v, _mm_shuffle_epi32::<0b00_00_11_10>(v));
     let v = _mm_add_epi32(v, _mm_shuffle_epi32::<0b00_00_00_01>(v));
@@ -48,7 +52,7 @@ fn sum_i32(v: __m256i) -> i64 {
 }
 
 #[target_feature(enable = "avx2")]
-fn sum_i64(v: __m256i) -> u64 {
+pub(super) fn sum_i64(v: __m256i) -> u64 {
     let v = _mm_add_epi64(_mm256_castsi256_si128(v), _mm256_extracti128_si256::<1>(v));
     let v = _mm_add_epi64(v, _mm_unpackhi_epi64(v, v));
     _mm_cvtsi128_si64(v) as u64
@@ -67,7 +71,13 @@ const AHEAD: usize = 8192;
 /// else have nothing to do while what follows the inner product is computed.
 #[inline(always)]
 pub(super) fn ask_ahead(step: &[u8; 64]) {
-    let ahead = step.as_ptr().wrapping_add(AHEAD);
+    ask_ahead_of(step.as_ptr());
+}
+
+/// [`ask_ahead`], from any place.
+#[inline(always)]
+pub(super) fn ask_ahead_of(place: *const u8) {
+    let ahead = place.wrapping_add(AHEAD);
     // SAFETY: a prefetch changes nothing that the program could see, and never faults, whatever the address.
     unsafe { _mm_prefetch::<_MM_HINT_T1>(ahead.cast()) };
 }

@@ -9,14 +9,14 @@ const BLOCK: usize = 1 << 16;
 
 /// Sums of a block.
 #[derive(Clone, Copy)]
-struct Block {
-    product: i32,
-    pixels: i32,
+pub(super) struct Block {
+    pub(super) product: i32,
+    pub(super) pixels: i32,
 }
 
 /// The sums over all lanes of both, in one go.
 #[target_feature(enable = "avx512f")]
-fn sum(product: __m512i, pixels: __m512i) -> Block {
+pub(super) fn sum(product: __m512i, pixels: __m512i) -> Block {
     let pairs = _mm512_add_epi32(
         _mm512_unpacklo_epi32(product, pixels),
         _mm512_unpackhi_epi32(product, pixels),

@@ -18,6 +18,7 @@ mod gap;
 mod learn;
 mod overlap;
 mod predict;
+mod row;
 #[cfg(test)]
 mod tests;
 mod watch;
@@ -31,6 +32,7 @@ use crate::{
     camera::{Line, Pixels, Timing},
     noise::{NoiseMeter, PixelNoise},
     pixel::Pixel,
+    raw::UpperBytes,
     reference::{Recipe, RowTable},
     timeline::{Binner, Displacement, Sample},
 };
@@ -39,6 +41,7 @@ use flicker::{Flicker, STEEPEST};
 use follow::Follow;
 use overlap::{Overlap, nearest_step};
 use predict::Prediction;
+use row::{Row, Scattered};
 use watch::Watch;
 
 /// What a line came to.
@@ -72,6 +75,8 @@ pub enum Stage {
 pub struct Tracker<'a> {
     config: Config,
     storage: Storage<'a>,
+    /// Where a line of scattered pixels is brought together.
+    room: &'a mut [u8],
     recipe: Recipe,
     stage: Stage,
     frame: Option<u32>,
@@ -144,6 +149,7 @@ impl<'a> Tracker<'a> {
         let mut tracker = Self {
             config,
             storage,
+            room: &mut [],
             recipe: Recipe {
                 level: config.level.unwrap_or(Level::Medium),
                 stride: usize::from(config.stride),
@@ -174,6 +180,15 @@ impl<'a> Tracker<'a> {
         };
         tracker.relearn();
         Ok(tracker)
+    }
+
+    /// Lends the room that lines of [`Pixels::Upper`] need, which are brought together there when the motion is large:
+    /// a line's width, best [`RawFormat::UPPER_SPARE`](crate::raw::RawFormat::UPPER_SPARE) more. Without it
+    /// such lines are misfits.
+    #[must_use]
+    pub fn with_line_room(mut self, room: &'a mut [u8]) -> Self {
+        self.room = room;
+        self
     }
 
     /// Which round it is in.
@@ -207,6 +222,7 @@ impl<'a> Tracker<'a> {
         match line.pixels {
             Pixels::U8(p) => self.push_u8(line, p),
             Pixels::U16(p) => self.push_u16(line, p),
+            Pixels::Upper(p) => self.push_upper(line, p),
         }
     }
 
@@ -217,6 +233,7 @@ impl<'a> Tracker<'a> {
         match line.pixels {
             Pixels::U8(p) => self.push_u8_into(line, p, binner),
             Pixels::U16(p) => self.push_u16_into(line, p, binner),
+            Pixels::Upper(p) => self.push_upper_into(line, p, binner),
         }
     }
 
@@ -247,25 +264,58 @@ impl<'a> Tracker<'a> {
         }
     }
 
+    #[inline(never)]
+    fn push_upper(&mut self, line: &Line<'_>, pixels: UpperBytes<'_>) -> Outcome {
+        self.push_scattered(line, pixels)
+    }
+
+    #[inline(always)]
+    fn push_scattered(&mut self, line: &Line<'_>, upper: UpperBytes<'_>) -> Outcome {
+        let room = core::mem::take(&mut self.room);
+        let outcome = match Scattered::new(upper, self.config.kernel, &mut *room) {
+            Some(row) => self.push_pixels(line, row),
+            None => self.misfit(),
+        };
+        self.room = room;
+        outcome
+    }
+
+    #[inline(never)]
+    fn push_upper_into(
+        &mut self,
+        line: &Line<'_>,
+        p: UpperBytes<'_>,
+        binner: &mut Binner,
+    ) -> Option<Sample> {
+        match self.push_scattered(line, p) {
+            Outcome::Measured(displacement) => binner.push_sound(displacement),
+            _ => None,
+        }
+    }
+
+    fn misfit(&mut self) -> Outcome {
+        self.counts.misfit = self.counts.misfit.wrapping_add(1);
+        Outcome::Misfit
+    }
+
     /// What every line takes, in a straight line; what only some take is called.
     #[inline(always)]
-    fn push_pixels<P: Pixel>(&mut self, line: &Line<'_>, pixels: &[P]) -> Outcome {
+    fn push_pixels<R: Row>(&mut self, line: &Line<'_>, mut pixels: R) -> Outcome {
         let row = usize::from(line.row);
         if line.row >= self.config.rows || pixels.len() != usize::from(self.config.width) {
-            self.counts.misfit = self.counts.misfit.wrapping_add(1);
-            return Outcome::Misfit;
+            return self.misfit();
         }
         if self.frame != Some(line.frame) {
             self.next_frame(line.frame, line.start_ns);
         }
         let mut aside_px = 0.0;
         if self.beside && self.stage == Stage::Tracking {
-            aside_px = self.work_beside::<P>(row);
+            aside_px = self.work_beside::<R::P>(row);
         }
-        let found = self.locate(row, pixels, aside_px);
+        let found = self.locate(row, &mut pixels, aside_px);
         if self.stage != Stage::Tracking {
             self.counts.learning = self.counts.learning.wrapping_add(1);
-            self.learn(row, pixels, found);
+            self.learn(row, pixels.pixels(), found);
             return Outcome::Learning;
         }
         match found {
@@ -349,7 +399,7 @@ impl<'a> Tracker<'a> {
 
     /// Shift of a line against the reference, whose row lies `aside_px` to the left of the others.
     #[inline(always)]
-    fn locate<P: Pixel>(&mut self, row: usize, pixels: &[P], aside_px: f32) -> Found {
+    fn locate<R: Row>(&mut self, row: usize, pixels: &mut R, aside_px: f32) -> Found {
         let Some(&table) = self.storage.tables.get(row) else {
             return Found::NoTexture;
         };
@@ -375,7 +425,7 @@ impl<'a> Tracker<'a> {
             || brighter.abs() > STEEPEST;
         let mut jumped = false;
         if due {
-            let Some(looked) = self.look_and_follow(row, &table, pixels, shift_px) else {
+            let Some(looked) = self.look_and_follow(row, &table, pixels.pixels(), shift_px) else {
                 return Found::Disturbed;
             };
             shift_px = looked;
@@ -383,7 +433,7 @@ impl<'a> Tracker<'a> {
             brighter = before / self.to_reference - 1.0;
         }
         if self.prediction.is_swift() && aside_px == 0.0 {
-            shift_px = self.unsmear(row, &table, pixels, shift_px);
+            shift_px = self.unsmear(row, &table, pixels.pixels(), shift_px);
         }
         shift_px -= aside_px;
         if jumped {
@@ -427,11 +477,11 @@ impl<'a> Tracker<'a> {
     /// The phase-correlation peak of a line near `expected_px`: one inner product where the motion is
     /// small.
     #[inline(always)]
-    fn correlate<P: Pixel>(
+    fn correlate<R: Row>(
         &mut self,
         row: usize,
         table: &RowTable,
-        pixels: &[P],
+        pixels: &mut R,
         expected_px: f32,
     ) -> Result<f32, Unfound> {
         // The common case: less than half a step from the reference, the whole line meets the whole row.
@@ -439,16 +489,17 @@ impl<'a> Tracker<'a> {
             let Some(coefficients) = part(self.storage.coefficients, row, pixels.len()) else {
                 return Err(Unfound::NoNumber);
             };
-            let (product, sum) = P::sums(self.config.kernel, pixels, coefficients);
+            let (product, sum) = pixels.sums(self.config.kernel, coefficients);
             // A black line has no brightness to divide by, and no texture to measure.
             self.to_reference = at_least_1(table.pixel_sum()) / at_least_1(sum);
             let near = table.shift_px(product * self.to_reference);
             if near.abs() <= self.near_px {
                 return Ok(near);
             }
-            return self.correlate_far(row, table, pixels, near.clamp(-4.0, 4.0), 1);
+            let near = near.clamp(-4.0, 4.0);
+            return self.correlate_far(row, table, pixels.pixels(), near, 1);
         }
-        self.correlate_far(row, table, pixels, expected_px, 0)
+        self.correlate_far(row, table, pixels.pixels(), expected_px, 0)
     }
 
     /// [`Tracker::correlate`] where the picture has moved by whole pixels: one inner product where that was

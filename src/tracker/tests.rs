@@ -3,6 +3,7 @@
 
 use super::*;
 use crate::band::MAX_HALF;
+use crate::raw::RawFormat;
 extern crate std;
 use std::{vec, vec::Vec};
 
@@ -90,6 +91,8 @@ struct Camera {
     dice: u32,
     scene: u8,
     surface: fn(u8, u16, f32) -> f32,
+    /// How its raw lines lie in memory.
+    format: RawFormat,
 }
 
 impl Camera {
@@ -99,6 +102,7 @@ impl Camera {
             dice: 1,
             scene: 0,
             surface,
+            format: RawFormat::Raw8,
         }
     }
 
@@ -124,11 +128,20 @@ impl Camera {
                 libm::roundf((self.surface)(self.scene, row, x as f32 - at) + noise) as u8
             });
             change(row, &mut pixels);
+            let bytes: Vec<u8> = match self.format {
+                RawFormat::Packed10 => pixels
+                    .chunks(4)
+                    .flat_map(|p| [p[0], p[1], p[2], p[3], 99])
+                    .collect(),
+                RawFormat::Packed12 => pixels.chunks(2).flat_map(|p| [p[0], p[1], 99]).collect(),
+                RawFormat::Raw16 => pixels.iter().flat_map(|&p| [99, p]).collect(),
+                _ => pixels.to_vec(),
+            };
             tracker.push(&Line {
                 frame,
                 row,
                 start_ns,
-                pixels: Pixels::U8(&pixels),
+                pixels: self.format.upper_line(&bytes, WIDTH, &mut []).unwrap(),
             })
         });
         outcomes.collect()
@@ -316,7 +329,7 @@ fn a_shift_beyond_all_bounds_overflows_nothing() {
         let line = [100u8; WIDTH];
         for huge in [2e9, 5e9, 1e19, f32::MAX, f32::INFINITY] {
             for huge in [huge, -huge] {
-                if let Ok(shift_px) = tracker.correlate(3, &table, &line, huge) {
+                if let Ok(shift_px) = tracker.correlate(3, &table, &mut &line[..], huge) {
                     assert!(shift_px.abs() <= WIDTH as f32);
                 }
                 assert!(tracker.rest(3, &line, huge).is_none());
@@ -416,5 +429,38 @@ fn in_a_hurry_swift_motion_is_followed_row_by_row() {
             "{amplitude_px} px at {hz} Hz: {missing} lines missing"
         );
         assert!(worst < 1.0, "{amplitude_px} px at {hz} Hz: {worst} px");
+    }
+}
+
+/// Learning, small and large motion, a hand and a jump: wherever the pixels lie, the same comes of them.
+#[test]
+fn pixels_measure_the_same_wherever_they_lie() {
+    let outcomes = |format, room: &mut [u8]| {
+        let mut memory = Memory::new();
+        let mut tracker = memory.tracker(1).with_line_room(room);
+        let mut camera = Camera::new(surface);
+        camera.format = format;
+        camera.teach(&mut tracker, tone(13.0, 0.3));
+        let mut all = camera.show(&mut tracker, tone(13.0, 0.3), |_, _| ());
+        all.extend(camera.show(&mut tracker, tone(13.0, 6.0), |_, _| ()));
+        let hand = |row: u16, pixels: &mut [u8; WIDTH]| {
+            if row > 9 {
+                pixels[20..80].fill(90);
+            }
+        };
+        all.extend(camera.show(&mut tracker, still, hand));
+        all.extend(camera.show(&mut tracker, |_| 9.0, |_, _| ()));
+        all
+    };
+    let expected = outcomes(RawFormat::Raw8, &mut []);
+    let measured = |all: &[Outcome]| {
+        let measured = all.iter().filter(|o| matches!(o, Outcome::Measured(_)));
+        measured.count()
+    };
+    assert!(measured(&expected) > 3 * ROWS);
+    for format in [RawFormat::Packed10, RawFormat::Packed12, RawFormat::Raw16] {
+        assert_eq!(outcomes(format, &mut [0; WIDTH]), expected, "{format:?}");
+        let without_room = outcomes(format, &mut [0; WIDTH - 1]);
+        assert!(without_room.iter().all(|o| *o == Outcome::Misfit));
     }
 }

@@ -126,7 +126,7 @@ impl Tracker<'_> {
             self.watch.rest = 8;
             fit = self
                 .search(row, table, pixels)
-                .and_then(|near| self.correlate(row, table, pixels, near).ok())
+                .and_then(|near| self.correlate(row, table, &mut &*pixels, near).ok())
                 .filter(|&shift| self.fits(row, pixels, shift));
         }
         self.watch.rest = self.watch.rest.saturating_sub(1);
@@ -291,7 +291,7 @@ impl Tracker<'_> {
         for start in (0..=reach).step_by(step as usize) {
             for start in [start, -start] {
                 let start_px = middle_px + start as f32;
-                let Ok(shift_px) = self.correlate(row, table, pixels, start_px) else {
+                let Ok(shift_px) = self.correlate(row, table, &mut &*pixels, start_px) else {
                     continue;
                 };
                 let Some(rest) = self.rest(row, pixels, shift_px) else {

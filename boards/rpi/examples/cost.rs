@@ -1,6 +1,6 @@
 //! What a line costs in this program beyond what it costs in the core.
 //!
-//! `cargo run --release -p rowtone-rpi --example cost`
+//! `cargo run --release -p rowtone-rpi --example cost [FORMAT]`
 //!
 //! The same frames go through tracker, binner and collector directly, their rows lying ready as the core wants
 //! them, and through this program's line path (frame clock, rows cut out of the frame, unpacking, light meter).
@@ -10,10 +10,9 @@ use std::time::Duration;
 
 use rowtone::analyzer::Collector;
 use rowtone::camera::{Line, Pixels};
-use rowtone::kernel::Kernel;
 use rowtone::raw::RawFormat;
 use rowtone::timeline::Binner;
-use rowtone::tracker::{Outcome, Tracker};
+use rowtone::tracker::Tracker;
 use rowtone_rpi::capture::simulated::{Scene, Simulated};
 use rowtone_rpi::capture::{Frame, Shape, Source};
 use rowtone_rpi::clock::FrameClock;
@@ -74,6 +73,7 @@ impl Best {
 }
 
 fn main() {
+    let wanted = std::env::args().nth(1).unwrap_or_default(); // all of them
     let scene = Scene {
         width: 640,
         height: 480,
@@ -101,6 +101,9 @@ fn main() {
         ("16 bit, upper 8", RawFormat::Raw16, &eight),
         ("10 bit packed, all 10", RawFormat::Packed10, &all),
     ] {
+        if !name.contains(&wanted) {
+            continue;
+        }
         facts.shape = Shape {
             stride: format.bytes(scene.width.into()),
             format,
@@ -133,21 +136,21 @@ fn core_alone(setup: &Setup, frames: &[(i64, Vec<u8>)]) -> Best {
     for (_, bytes) in frames {
         for line in bytes.chunks_exact(shape.stride) {
             let pixels = if setup.tracker.bits == 8 {
-                let kernel = Kernel::detect();
-                shape.format.upper_line(kernel, line, width, &mut upper)
+                shape.format.upper_line(line, width, &mut upper)
             } else {
                 shape.format.line(line, width, &mut words)
             };
-            match pixels.expect("a whole line") {
-                Pixels::U8(p) => ready8.extend_from_slice(p),
-                Pixels::U16(p) => ready16.extend_from_slice(p),
+            let values = pixels.expect("a whole line").values();
+            match setup.tracker.bits {
+                8 => ready8.extend(values.map(|v| v as u8)),
+                _ => ready16.extend(values),
             }
         }
     }
     let rows = usize::from(setup.part.height);
     let mut tracker_memory = TrackerMemory::new(setup.part.width, setup.part.height);
     let mut spectrum_memory = SpectrumMemory::new(setup.group, setup.window_frames);
-    let mut tracker = Tracker::new(setup.tracker, tracker_memory.lend()).expect("good");
+    let mut tracker = Tracker::new(setup.tracker, tracker_memory.lend().0).expect("good");
     let mut binner = Binner::new(setup.group);
     let collected = spectrum_memory.lend().collected;
     let mut collector = Collector::new(&setup.spectrum, setup.group, collected).expect("good");
@@ -170,9 +173,7 @@ fn core_alone(setup: &Setup, frames: &[(i64, Vec<u8>)]) -> Best {
                     start_ns: start_ns + timing.start_ns(row),
                     pixels,
                 };
-                if let Outcome::Measured(d) = tracker.push(&line)
-                    && let Some(sample) = binner.push(d)
-                {
+                if let Some(sample) = tracker.push_into(&line, &mut binner) {
                     collector.push(sample);
                 }
             }

@@ -4,12 +4,10 @@
 
 use rowtone::analyzer::Collector;
 use rowtone::camera::{Line, Pixels};
-use rowtone::kernel::Kernel;
-use rowtone::raw::UPPER_SPARE;
 use rowtone::report::{Warning, Warnings};
 use rowtone::spectrum::{self, SampleBuffer};
 use rowtone::timeline::Binner;
-use rowtone::tracker::{self, Counts, Outcome, Storage, Tracker};
+use rowtone::tracker::{self, Counts, Storage, Tracker};
 
 use crate::capture::Frame;
 use crate::clock::FrameClock;
@@ -24,10 +22,9 @@ pub struct Lines<'a> {
     collector: Collector<'a>,
     clock: FrameClock,
     light: Light,
-    /// Where rows of more than 8 bits are unpacked to, or their upper bytes.
+    /// Where rows of more than 8 bits are unpacked to, or the upper bytes of right-aligned words.
     words: Vec<u16>,
     upper: Vec<u8>,
-    kernel: Kernel,
     /// Bytes of a whole frame.
     frame_bytes: usize,
     /// As they were when the last window was complete.
@@ -54,14 +51,10 @@ impl Light {
         let full = (1u32 << bits) - 1;
         let high = (full - full / 64) as u16;
         let (mut sum, mut saturated) = (0u64, 0u32);
-        let mut add = |value: u16| {
+        pixels.values().for_each(|value| {
             sum += u64::from(value);
             saturated += u32::from(value >= high);
-        };
-        match pixels {
-            Pixels::U8(p) => p.iter().for_each(|&v| add(v.into())),
-            Pixels::U16(p) => p.iter().for_each(|&v| add(v)),
-        }
+        });
         let n = pixels.len().max(1) as f32;
         Self {
             mean: sum as f32 / n / full as f32,
@@ -104,7 +97,7 @@ impl<'a> Lines<'a> {
     pub fn new(
         setup: &'a Setup,
         clock: FrameClock,
-        tracker: Storage<'a>,
+        (tracker, line_room): (Storage<'a>, &'a mut [u8]),
         collected: SampleBuffer<'a>,
     ) -> Result<Self, LinesError> {
         let collector = Collector::new(&setup.spectrum, setup.group, collected);
@@ -112,7 +105,9 @@ impl<'a> Lines<'a> {
         let shape = &setup.shape;
         let line_end = shape.format.bytes((setup.part.x + setup.part.width).into());
         Ok(Self {
-            tracker: Tracker::new(setup.tracker, tracker).map_err(LinesError::Tracker)?,
+            tracker: Tracker::new(setup.tracker, tracker)
+                .map_err(LinesError::Tracker)?
+                .with_line_room(line_room),
             binner: Binner::new(setup.group),
             collector: collector.map_err(LinesError::Spectrum)?,
             clock,
@@ -121,8 +116,7 @@ impl<'a> Lines<'a> {
                 saturated: 0.0,
             },
             words: vec![0; setup.part.width.into()],
-            upper: vec![0; usize::from(setup.part.width) + UPPER_SPARE],
-            kernel: Kernel::detect(),
+            upper: vec![0; setup.part.width.into()],
             frame_bytes: last_row * shape.stride + line_end,
             told: Counts::default(),
             setup,
@@ -152,8 +146,7 @@ impl<'a> Lines<'a> {
             let at = first + usize::from(row) * shape.stride;
             let bytes = frame.bytes.get(at..).unwrap_or_default();
             let pixels = if bits == 8 {
-                let upper = &mut self.upper;
-                shape.format.upper_line(self.kernel, bytes, width, upper)
+                shape.format.upper_line(bytes, width, &mut self.upper)
             } else {
                 shape.format.line(bytes, width, &mut self.words)
             };
@@ -169,10 +162,7 @@ impl<'a> Lines<'a> {
                 start_ns: start_ns.saturating_add(group.timing().start_ns(row)),
                 pixels,
             };
-            let Outcome::Measured(displacement) = self.tracker.push(&line) else {
-                continue;
-            };
-            let Some(sample) = self.binner.push(displacement) else {
+            let Some(sample) = self.tracker.push_into(&line, &mut self.binner) else {
                 continue;
             };
             if self.collector.push(sample) {

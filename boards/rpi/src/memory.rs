@@ -1,5 +1,6 @@
 //! All the memory that measuring takes, got once.
 
+use rowtone::raw::RawFormat;
 use rowtone::reference::RowTable;
 use rowtone::report::MAX_PEAKS;
 use rowtone::spectrum::{EstimatorStorage, FrameMark, SampleBuffer, Storage as SpectrumStorage};
@@ -20,6 +21,7 @@ pub struct TrackerMemory {
     columns: Vec<ColumnLearning>,
     fresh: Vec<i8>,
     scratch: Vec<f32>,
+    line: Vec<u8>,
 }
 
 impl TrackerMemory {
@@ -35,12 +37,13 @@ impl TrackerMemory {
             columns: vec![ColumnLearning::default(); width],
             fresh: vec![0; width],
             scratch: vec![0.0; 2 * width],
+            line: vec![0; width + RawFormat::UPPER_SPARE],
         }
     }
 
-    /// Lends all of it.
-    pub fn lend(&mut self) -> TrackerStorage<'_> {
-        TrackerStorage {
+    /// Lends all of it: the tracker's buffers, and the room for a line.
+    pub fn lend(&mut self) -> (TrackerStorage<'_>, &mut [u8]) {
+        let storage = TrackerStorage {
             coefficients: &mut self.coefficients,
             tables: &mut self.tables,
             mean: &mut self.mean,
@@ -49,7 +52,8 @@ impl TrackerMemory {
             columns: &mut self.columns,
             fresh: &mut self.fresh,
             scratch: &mut self.scratch,
-        }
+        };
+        (storage, &mut self.line)
     }
 }
 

@@ -106,10 +106,8 @@ impl Frame {
 
 #[inline]
 fn cut(plane: Pixels<'_>, range: Range<usize>) -> Pixels<'_> {
-    match plane {
-        Pixels::U8(p) => Pixels::U8(&p[range]),
-        Pixels::U16(p) => Pixels::U16(&p[range]),
-    }
+    let part = plane.part(range.start, range.len());
+    part.expect("a part lies inside its picture")
 }
 
 #[cfg(test)]

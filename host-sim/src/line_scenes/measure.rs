@@ -1,7 +1,7 @@
 //! A recording through the real tracker, and its figures.
 
 use rowtone::analyzer::Analyzer;
-use rowtone::camera::{Line, Pixels};
+use rowtone::camera::Line;
 use rowtone::spectrum;
 use rowtone::timeline::{Binner, Displacement, Group, rows_per_sample};
 use rowtone::tracker::{Config, ConfigError, Outcome, Storage, Tracker};
@@ -172,10 +172,7 @@ fn track(
 ) -> Vec<Displacement> {
     let lines = (0..frame.rows()).filter_map(|row| frame.line(row));
     let shifts = lines.filter_map(|line| {
-        let pixels = match line.pixels {
-            Pixels::U8(p) => Pixels::U8(p.get(cols.clone())?),
-            Pixels::U16(p) => Pixels::U16(p.get(cols.clone())?),
-        };
+        let pixels = line.pixels.part(cols.start, cols.len())?;
         match tracker.push(&Line {
             pixels,
             start_ns: line.start_ns + later_ns,

@@ -36,11 +36,11 @@ impl Frame {
     /// The line of `row`, as the core takes it; `None` beyond the last.
     pub fn line(&self, row: u32) -> Option<Line<'_>> {
         let cols = self.cols as usize;
-        let part = (row as usize * cols)..((row as usize + 1) * cols);
         let pixels = match &self.pixels {
-            PixelBuffer::U8(p) => Pixels::U8(p.get(part)?),
-            PixelBuffer::U16(p) => Pixels::U16(p.get(part)?),
+            PixelBuffer::U8(p) => Pixels::U8(p),
+            PixelBuffer::U16(p) => Pixels::U16(p),
         };
+        let pixels = pixels.part(row as usize * cols, cols)?;
         let order = if self.bottom_up {
             self.rows - 1 - row
         } else {

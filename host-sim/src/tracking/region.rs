@@ -206,6 +206,12 @@ fn read(pixels: Pixels<'_>, line: &mut [f32]) -> f32 {
             line.iter_mut().zip(p).for_each(|(l, &p)| *l = f32::from(p));
             p.iter().map(|&p| u64::from(p)).sum::<u64>() as f32
         }
+        Pixels::Upper(p) => {
+            line.iter_mut()
+                .zip(p.iter())
+                .for_each(|(l, p)| *l = f32::from(p));
+            p.iter().map(u32::from).sum::<u32>() as f32
+        }
     }
 }
 

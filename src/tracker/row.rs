@@ -1,0 +1,75 @@
+//! A line as the tracker takes it: side by side in memory, or brought together only when it must be.
+
+use crate::{kernel::Kernel, pixel::Pixel, raw::UpperBytes};
+
+/// The pixels of a line.
+pub(super) trait Row {
+    /// One of them.
+    type P: Pixel;
+    /// How many they are.
+    fn len(&self) -> usize;
+    /// Σ h·p and Σ p of all of them, as [`Pixel::sums`].
+    fn sums(&self, kernel: Kernel, coefficients: &[i8]) -> (f32, f32);
+    /// All of them, side by side.
+    fn pixels(&mut self) -> &[Self::P];
+}
+
+impl<P: Pixel> Row for &[P] {
+    type P = P;
+    #[inline(always)]
+    fn len(&self) -> usize {
+        <[P]>::len(self)
+    }
+    #[inline(always)]
+    fn sums(&self, kernel: Kernel, coefficients: &[i8]) -> (f32, f32) {
+        P::sums(kernel, self, coefficients)
+    }
+    #[inline(always)]
+    fn pixels(&mut self) -> &[P] {
+        self
+    }
+}
+
+/// Upper bytes that lie among others. The common case, small motion, takes one inner product and reads them where
+/// they are; whatever else comes has them copied, once.
+#[derive(Debug)]
+pub(super) struct Scattered<'a> {
+    upper: UpperBytes<'a>,
+    kernel: Kernel,
+    /// Room for the line.
+    room: &'a mut [u8],
+    together: bool,
+}
+
+impl<'a> Scattered<'a> {
+    /// `None` where `room` is less than the line.
+    pub(super) fn new(upper: UpperBytes<'a>, kernel: Kernel, room: &'a mut [u8]) -> Option<Self> {
+        (room.len() >= upper.len()).then_some(Self {
+            upper,
+            kernel,
+            room,
+            together: false,
+        })
+    }
+}
+
+impl Row for Scattered<'_> {
+    type P = u8;
+    #[inline(always)]
+    fn len(&self) -> usize {
+        self.upper.len()
+    }
+    #[inline(always)]
+    fn sums(&self, kernel: Kernel, coefficients: &[i8]) -> (f32, f32) {
+        let sums = self.upper.sums(kernel, coefficients);
+        (sums.product as i32 as f32, sums.pixels as u32 as f32)
+    }
+    #[inline(never)]
+    fn pixels(&mut self) -> &[u8] {
+        if !self.together {
+            self.upper.gather(self.kernel, self.room);
+            self.together = true;
+        }
+        self.room.get(..self.upper.len()).unwrap_or_default()
+    }
+}
