@@ -52,7 +52,7 @@ impl fmt::Display for State {
             Self::StuckInReset => {
                 f.write_str("camera: stuck in reset, trying again; check its supply")
             }
-            Self::BadConfig(e) => write!(f, "camera: configuration refused: {e:?}"),
+            Self::BadConfig(e) => write!(f, "camera: configuration refused: {e}"),
             Self::Silent => {
                 f.write_str("camera: set up but silent, trying again; check PCLK, HREF, MCLK")
             }

@@ -40,7 +40,10 @@ pub(crate) fn machine(pio0: Peri<'static, PIO0>, pins: Pins) -> Machine {
     let Pio {
         mut common, sm0, ..
     } = Pio::new(pio0, Irqs);
-    let program = common.load_program(&program(CAMERA.bus));
+    // Not `load_program`: its panic would bring in the printing of structures, which is 1 KiB.
+    let Ok(program) = common.try_load_program(&program(CAMERA.bus)) else {
+        panic!("no room for the PIO program")
+    };
     let (d0, d1, d2, d3, d4, d5, d6, d7, pclk, href) = pins;
     let pins = [
         &common.make_pio_pin(d0),
