@@ -96,6 +96,7 @@ pub mod reference;
 pub mod report;
 pub mod settings;
 pub mod spectrum;
+mod time;
 pub mod timeline;
 pub mod tracker;
 pub mod wire;

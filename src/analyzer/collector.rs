@@ -4,6 +4,7 @@ use super::Reporter;
 use crate::spectrum::{
     Config, ConfigError, FrameMark, SampleBuffer, WindowMark, follow_spread, pack_weight, skew_of,
 };
+use crate::time::since;
 use crate::timeline::{Group, Sample, Spread};
 
 /// Collects samples to windows.
@@ -80,9 +81,7 @@ impl<'a> Collector<'a> {
             && sample.shift_px.is_finite()
             && sample.shift_px.abs() < 1e6
             && sample.slot < self.group.slots();
-        let start_ns = sample
-            .time_ns
-            .saturating_sub(self.group.middle_ns(sample.slot));
+        let start_ns = since(sample.time_ns, self.group.middle_ns(sample.slot));
         // Clocks count from when something was switched on: centuries are nonsense.
         if !known || start_ns.unsigned_abs() > 1 << 62 {
             self.dropped_samples = self.dropped_samples.saturating_add(1);
@@ -95,8 +94,8 @@ impl<'a> Collector<'a> {
         let new_frame = self.newest().is_none_or(|f| f.number != sample.frame);
         let back = self
             .newest()
-            .is_some_and(|f| start_ns < f.start_ns.saturating_sub(self.window_ns));
-        if back || (new_frame && start_ns >= self.end_ns.saturating_sub(self.slack_ns())) {
+            .is_some_and(|f| start_ns < since(f.start_ns, self.window_ns));
+        if back || (new_frame && start_ns >= since(self.end_ns, self.slack_ns())) {
             let complete = self.complete(self.end_ns);
             self.pending = Some(sample);
             self.advance(start_ns, back);
@@ -122,7 +121,7 @@ impl<'a> Collector<'a> {
         let end = newest.start_ns.saturating_add(period.max(1));
         let fresh = match self.done_ns {
             Some(done) => {
-                end.saturating_sub(done).saturating_mul(5)
+                since(end, done).saturating_mul(5)
                     >= self.hop_ns.min(self.window_ns).saturating_mul(2)
             }
             None => true,
@@ -172,7 +171,7 @@ impl<'a> Collector<'a> {
 
     /// How many of the held frames are before `start_ns`.
     fn first_of(&self, start_ns: i64) -> usize {
-        let start_ns = start_ns.saturating_sub(self.slack_ns());
+        let start_ns = since(start_ns, self.slack_ns());
         (0..self.held)
             .take_while(|&i| self.frame(i).is_some_and(|f| f.start_ns < start_ns))
             .count()
@@ -189,7 +188,7 @@ impl<'a> Collector<'a> {
     fn period_ns(&self) -> Option<i64> {
         let (first, last) = (self.frame(0)?, self.newest()?);
         let periods = i64::from(last.number.wrapping_sub(first.number));
-        let span = last.start_ns.saturating_sub(first.start_ns);
+        let span = since(last.start_ns, first.start_ns);
         (periods > 0 && span > 0 && self.held > 1).then(|| span / periods)
     }
 
@@ -198,9 +197,7 @@ impl<'a> Collector<'a> {
             self.restart = false;
             self.held = 0;
         }
-        let start_ns = sample
-            .time_ns
-            .saturating_sub(self.group.middle_ns(sample.slot));
+        let start_ns = since(sample.time_ns, self.group.middle_ns(sample.slot));
         if let Some(newest) = self.newest()
             && newest.number != sample.frame
             && start_ns <= newest.start_ns
@@ -252,7 +249,7 @@ impl<'a> Collector<'a> {
 
     /// Marks the window that ends at `end_ns` as complete, if there is a frame in it.
     fn complete(&mut self, end_ns: i64) -> bool {
-        let start_ns = end_ns.saturating_sub(self.window_ns);
+        let start_ns = since(end_ns, self.window_ns);
         let first = self.first_of(start_ns);
         let frames = self.held - first;
         let (Some(a), Some(b)) = (self.frame(first), self.newest()) else {
@@ -275,7 +272,7 @@ impl<'a> Collector<'a> {
         let origin_ns = self.origin_ns.unwrap_or(start_ns);
         let period = self.period_ns().unwrap_or(0);
         // Short: the first frame is more than a frame late, as at a start or where the ring is too small.
-        let short = a.start_ns.saturating_sub(start_ns) > period.saturating_mul(3) / 2;
+        let short = since(a.start_ns, start_ns) > period.saturating_mul(3) / 2;
         self.ready = Some(WindowMark {
             seq: self.seq,
             start_ns: start_ns.max(a.start_ns),
@@ -293,7 +290,7 @@ impl<'a> Collector<'a> {
 
     /// Moves the end on past `start_ns`; after a pause or a clock set back, begins anew there.
     fn advance(&mut self, start_ns: i64, back: bool) {
-        let late = start_ns.saturating_sub(self.end_ns);
+        let late = since(start_ns, self.end_ns);
         if back || late > self.window_ns {
             self.end_ns = start_ns.saturating_add(self.window_ns);
             self.done_ns = None;

@@ -5,6 +5,7 @@ use crate::spectrum::{
     Config, ConfigError, Estimator, EstimatorStorage, Follower, SampleBuffer, Tones, WindowMark,
     name_harmonics,
 };
+use crate::time::since;
 use crate::timeline::Group;
 
 /// Makes reports of windows.
@@ -60,10 +61,10 @@ impl<'a> Reporter<'a> {
     pub fn report(&mut self) -> Report {
         let mut tones = self.estimator.tones();
         let mark = *self.estimator.mark();
-        let window_s = mark.end_ns.saturating_sub(mark.start_ns).max(1) as f32 * 1e-9;
+        let window_s = since(mark.end_ns, mark.start_ns).max(1) as f32 * 1e-9;
         let elapsed_s = self
             .last_end_ns
-            .map_or(0.0, |last| mark.end_ns.saturating_sub(last) as f32 * 1e-9);
+            .map_or(0.0, |last| since(mark.end_ns, last) as f32 * 1e-9);
         self.last_end_ns = Some(mark.end_ns);
         self.follower
             .follow(&mut tones.peaks, &tones.hz_per_s, 1.0 / window_s, elapsed_s);
@@ -71,8 +72,7 @@ impl<'a> Reporter<'a> {
         let um_per_px = self.estimator.config().um_per_px;
         Report {
             seq: mark.seq,
-            time_ms: ((mark.end_ns.saturating_sub(mark.origin_ns).max(0) as u64)
-                .saturating_add(500_000))
+            time_ms: ((since(mark.end_ns, mark.origin_ns).max(0) as u64).saturating_add(500_000))
                 / 1_000_000,
             window_s,
             fps: tones.fps,
@@ -114,5 +114,5 @@ fn band_velocity(tones: &Tones, um_per_px: f32) -> f32 {
         let speed = core::f32::consts::TAU * peak.hz * mm;
         squares += 0.5 * speed * speed;
     }
-    libm::sqrtf(squares)
+    crate::kernel::sqrtf(squares)
 }

@@ -12,10 +12,13 @@ mod aarch64;
 mod cortex_m;
 mod portable;
 pub(crate) mod spread;
+mod sqrt;
 #[cfg(target_arch = "x86_64")]
 mod x86_64;
 #[cfg(target_arch = "x86_64")]
 mod x86_64_avx512;
+
+pub(crate) use sqrt::sqrtf;
 
 /// Largest magnitude of a coefficient: 2·64·255 < 2¹⁵.
 pub const MAX_COEFFICIENT: i8 = 64;

@@ -444,7 +444,7 @@ impl Build {
             / stride;
         let information = slope * slope / self.noise_power;
         // The reference's own noise makes slopes of about sqrt(Σ h²σ²/frames).
-        let chance = libm::sqrtf(self.noise_power / self.frames) * 3.0;
+        let chance = crate::kernel::sqrtf(self.noise_power / self.frames) * 3.0;
         let sure = slope > chance && information * WORST_SD_PX * WORST_SD_PX >= 1.0;
         if !sure || !information.is_finite() {
             return table;

@@ -16,8 +16,9 @@
 
 use core::fmt;
 
-use heapless::Vec;
+use heapless::String;
 
+use super::real::whole;
 use super::{Key, Settings, SettingsError, ValueError};
 use crate::outbox::ResendError;
 use crate::wire::text::command_in_sentence;
@@ -128,16 +129,16 @@ impl<'a> Changes<'a> {
 ///
 /// # Errors
 /// Says what is wrong with it.
-pub fn parse(line: &str) -> Result<Command<'_>, CommandError<'_>> {
+pub fn parse<'a>(line: &'a str) -> Result<Command<'a>, CommandError<'a>> {
     let line = if line.starts_with('$') {
         command_in_sentence(line).ok_or(CommandError::Checksum)?
     } else {
         line
     };
     let line = line.trim_ascii();
-    let (word, rest) = line.split_once(' ').unwrap_or((line, ""));
-    let rest = rest.trim_ascii();
-    let mut words = rest.split_ascii_whitespace();
+    let mut words = line.split_ascii_whitespace();
+    let word = words.next().unwrap_or("");
+    let rest = line.get(word.len()..).unwrap_or("").trim_ascii();
     let command = match word {
         "version" => Command::Version,
         "status" => Command::Status,
@@ -151,7 +152,7 @@ pub fn parse(line: &str) -> Result<Command<'_>, CommandError<'_>> {
         "set" if rest.is_empty() => return Err(CommandError::Missing("a setting and its value")),
         "set" => return Ok(Command::Set(Changes(rest))),
         "resend" => {
-            let number = |text| str::parse(text).map_err(|_| CommandError::Number(text));
+            let number = |text: &'a str| whole(text.as_bytes()).ok_or(CommandError::Number(text));
             let missing = CommandError::Missing("the number of a report");
             let from = number(words.next().ok_or(missing)?)?;
             let to = words.next().map_or(Ok(from), number)?;
@@ -168,8 +169,9 @@ pub fn parse(line: &str) -> Result<Command<'_>, CommandError<'_>> {
 /// Collects a command line from bytes as they come.
 #[derive(Clone, Debug, Default)]
 pub struct LineReader {
-    line: Vec<u8, MAX_COMMAND>,
+    line: String<MAX_COMMAND>,
     too_long: bool,
+    not_text: bool,
     complete: bool,
 }
 
@@ -177,8 +179,9 @@ impl LineReader {
     /// Waits for the first line.
     pub const fn new() -> Self {
         Self {
-            line: Vec::new(),
+            line: String::new(),
             too_long: false,
+            not_text: false,
             complete: false,
         }
     }
@@ -189,28 +192,24 @@ impl LineReader {
     /// The line was too long or is not text; the next one starts anew.
     pub fn push(&mut self, byte: u8) -> Option<Result<&str, CommandError<'static>>> {
         if self.complete {
-            self.line.clear();
-            self.too_long = false;
-            self.complete = false;
+            *self = Self::new();
         }
         if !matches!(byte, b'\r' | b'\n') {
-            self.too_long |= self.line.push(byte).is_err();
+            let plain = matches!(byte, b' '..=b'~' | b'\t');
+            self.not_text |= !plain;
+            // What is no text takes its place all the same.
+            let plain = if plain { byte } else { b'?' };
+            self.too_long |= self.line.push(char::from(plain)).is_err();
             return None;
         }
         self.complete = true;
         if self.line.is_empty() {
             return None;
         }
-        if self.too_long {
-            return Some(Err(CommandError::TooLong));
-        }
-        if !self
-            .line
-            .iter()
-            .all(|&byte| matches!(byte, b' '..=b'~' | b'\t'))
-        {
-            return Some(Err(CommandError::NotText));
-        }
-        Some(core::str::from_utf8(&self.line).map_err(|_| CommandError::NotText))
+        Some(match () {
+            () if self.too_long => Err(CommandError::TooLong),
+            () if self.not_text => Err(CommandError::NotText),
+            () => Ok(&self.line),
+        })
     }
 }

@@ -95,6 +95,10 @@ impl Key {
     pub fn set(self, settings: &mut Settings, text: &str) -> Result<(), ValueError> {
         let wrong = ValueError(self);
         let number = |text: &str| real::parse(text).ok_or(wrong);
+        let byte = |text: &str| {
+            let whole = real::whole(text.as_bytes()).and_then(|n| u8::try_from(n).ok());
+            whole.ok_or(wrong)
+        };
         let optional = |text: &str| match text {
             "none" => Ok(None),
             text => number(text).map(Some),
@@ -102,7 +106,7 @@ impl Key {
         match self {
             Self::Window => settings.window_s = number(text)?,
             Self::Hop => settings.hop_s = number(text)?,
-            Self::MaxPeaks => settings.max_peaks = text.parse().map_err(|_| wrong)?,
+            Self::MaxPeaks => settings.max_peaks = byte(text)?,
             Self::FalseAlarm => settings.false_alarm = number(text)?,
             Self::UmPerPx => settings.um_per_px = optional(text)?,
             Self::Roi => {
@@ -121,7 +125,7 @@ impl Key {
                     _ => return Err(wrong),
                 }
             }
-            Self::Unit => settings.unit = text.parse().map_err(|_| wrong)?,
+            Self::Unit => settings.unit = byte(text)?,
         }
         Ok(())
     }
@@ -159,8 +163,8 @@ impl Key {
 }
 
 fn parse_region(text: &str) -> Option<Region> {
-    let mut parts = text.split(',').map(|part| part.parse().ok());
-    let mut next = || parts.next().flatten();
+    let mut parts = text.as_bytes().split(|&byte| byte == b',');
+    let mut next = || u16::try_from(real::whole(parts.next()?)?).ok();
     let region = Region {
         x: next()?,
         y: next()?,

@@ -28,39 +28,66 @@ fn scaled(mut value: f32, power: i32) -> f32 {
     value
 }
 
+/// Whether a minus stands in front, and what stands behind the sign.
+fn signed(text: &[u8]) -> (bool, &[u8]) {
+    match text {
+        [b'-', rest @ ..] => (true, rest),
+        [b'+', rest @ ..] => (false, rest),
+        _ => (false, text),
+    }
+}
+
+/// One or more digits.
+fn digits(text: &[u8]) -> Option<u32> {
+    if text.is_empty() {
+        return None;
+    }
+    text.iter().try_fold(0_u32, |number, &byte| {
+        let digit = byte.is_ascii_digit().then(|| u32::from(byte - b'0'))?;
+        number.checked_mul(10)?.checked_add(digit)
+    })
+}
+
+/// Reads a whole number from 0 to 2³² − 1, a plus in front of it or not; anything else is `None`. One such
+/// function for all: the standard library's has a copy for each type.
+pub(super) fn whole(text: &[u8]) -> Option<u32> {
+    match signed(text) {
+        (true, _) => None,
+        (false, text) => digits(text),
+    }
+}
+
 /// Reads an optional sign, digits with at most one point among them, and an optional exponent.
 /// Anything else, and what is beyond an `f32`, is `None`.
 pub(super) fn parse(text: &str) -> Option<f32> {
-    let (negative, digits) = match text.strip_prefix('-') {
-        Some(rest) => (true, rest),
-        None => (false, text.strip_prefix('+').unwrap_or(text)),
-    };
-    let (digits, exponent) = match digits.split_once(['e', 'E']) {
-        Some((digits, exponent)) => (digits, exponent.parse::<i8>().ok()?),
-        None => (digits, 0),
-    };
-    let (whole, part) = digits.split_once('.').unwrap_or((digits, ""));
-    if whole.is_empty() && part.is_empty() {
-        return None;
-    }
-    let (mut mantissa, mut power) = (0_u32, i32::from(exponent));
-    for (bytes, is_part) in [(whole, false), (part, true)] {
-        for byte in bytes.bytes() {
-            if !byte.is_ascii_digit() {
-                return None;
+    let (negative, mut rest) = signed(text.as_bytes());
+    let (mut mantissa, mut power) = (0_u32, 0_i32);
+    let (mut is_number, mut is_part) = (false, false);
+    while let [byte, behind @ ..] = rest {
+        rest = behind;
+        match byte {
+            b'0'..=b'9' => {
+                // Beyond nine digits they only count for the power.
+                let taken = mantissa < 100_000_000;
+                if taken {
+                    mantissa = mantissa * 10 + u32::from(byte - b'0');
+                }
+                power = power.saturating_add(i32::from(!taken) - i32::from(is_part));
+                is_number = true;
             }
-            // Beyond nine digits they only count for the power.
-            let taken = mantissa < 100_000_000;
-            if taken {
-                mantissa = mantissa * 10 + u32::from(byte - b'0');
+            b'.' if !is_part => is_part = true,
+            b'e' | b'E' => {
+                let (down, exponent) = signed(rest);
+                let exponent = i32::from(i8::try_from(digits(exponent)?).ok()?);
+                power = power.saturating_add(if down { -exponent } else { exponent });
+                break;
             }
-            power = power.saturating_add(i32::from(!taken) - i32::from(is_part));
+            _ => return None,
         }
     }
     let value = scaled(mantissa as f32, power);
-    value
-        .is_finite()
-        .then_some(if negative { -value } else { value })
+    let value = if negative { -value } else { value };
+    (is_number && value.is_finite()).then_some(value)
 }
 
 /// Writes a number in as few digits as tell it from its neighbours, never with an exponent.
@@ -152,6 +179,30 @@ mod tests {
             "1 ", "--1", "1e1.5",
         ] {
             assert_eq!(parse(text), None, "{text}");
+        }
+    }
+
+    #[test]
+    fn whole_numbers_as_the_standard_library_reads_them() {
+        for text in [
+            "0",
+            "7",
+            "+7",
+            "007",
+            "4294967295",
+            "4294967296",
+            "99999999999",
+            "",
+            "+",
+            "-0",
+            "-1",
+            "1.0",
+            "1e3",
+            " 1",
+            "0x1",
+        ] {
+            let expected = text.parse::<u32>().ok().filter(|_| !text.starts_with('-'));
+            assert_eq!(whole(text.as_bytes()), expected, "{text}");
         }
     }
 

@@ -219,7 +219,7 @@ impl Fit {
             .map_or(Complex::new(1.0, 0.0), |t| t.amplitude);
         let size = amplitude.norm_sqr();
         let along = if size > 0.0 {
-            amplitude.unscale(libm::sqrtf(size))
+            amplitude.unscale(crate::kernel::sqrtf(size))
         } else {
             Complex::new(1.0, 0.0)
         };
@@ -236,8 +236,8 @@ impl Fit {
             }
         }
         Deviation {
-            hz: libm::sqrtf(self.normal.variance(&of_hz)),
-            amplitude_px: libm::sqrtf(self.normal.variance(&of_amplitude)),
+            hz: crate::kernel::sqrtf(self.normal.variance(&of_hz)),
+            amplitude_px: crate::kernel::sqrtf(self.normal.variance(&of_amplitude)),
         }
     }
 }

@@ -6,6 +6,7 @@
 use super::model::NO_SKEW;
 use super::storage::EstimatorStorage;
 use super::window::{SampleBuffer, pack_weight, skew_unit_ns, unpack_weight};
+use crate::time::since;
 use crate::timeline::Group;
 
 /// What a window is, as far as the fit wants to know.
@@ -128,12 +129,12 @@ impl Loaded {
         let (first, last) = (first.unwrap_or(0), last.unwrap_or(0));
         let begin = first.saturating_add(s.slot_ns.first().copied().unwrap_or(0));
         let end = last.saturating_add(s.slot_ns[..slots].last().copied().unwrap_or(0));
-        let span_ns = end.saturating_sub(begin).max(1);
-        let center = begin.saturating_add(span_ns / 2).saturating_sub(middle);
+        let span_ns = since(end, begin).max(1);
+        let center = since(begin.saturating_add(span_ns / 2), middle);
         self.length_s = span_ns as f32 * 1e-9;
         self.total_weight = total;
         for i in 0..frames {
-            s.frame_ns[i] = s.samples.frames[i].start_ns.saturating_sub(center);
+            s.frame_ns[i] = since(s.samples.frames[i].start_ns, center);
             frame_t[i] = s.frame_ns[i] as f32 / span_ns as f32;
         }
         for slot in 0..slots {
@@ -148,17 +149,24 @@ impl Loaded {
             return;
         };
         let periods = b.number.wrapping_sub(a.number) as i32;
-        let span = b.start_ns.saturating_sub(a.start_ns);
+        let span = since(b.start_ns, a.start_ns);
         if periods <= 0 || span <= 0 {
             return;
         }
         let period_ns = span / i64::from(periods);
+        let left = span % i64::from(periods);
         let slack = (period_ns / 8).max(1);
         self.fps = periods as f32 / (span as f32 * 1e-9);
         self.steady_rate = marks.iter().all(|m| {
             let n = i64::from(m.number.wrapping_sub(a.number));
-            let expected = (i128::from(span) * i128::from(n) / i128::from(periods)) as i64;
-            (m.start_ns.saturating_sub(a.start_ns) - expected).abs() < slack
+            // span·n/periods, which would not fit 64 bits on the way.
+            let expected = period_ns
+                .wrapping_mul(n)
+                .wrapping_add(left * n / i64::from(periods));
+            since(m.start_ns, a.start_ns)
+                .wrapping_sub(expected)
+                .unsigned_abs()
+                < slack.unsigned_abs()
         });
     }
 }

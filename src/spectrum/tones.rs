@@ -65,10 +65,11 @@ impl Telling<'_> {
         let mut tones = Tones::nothing(self.fps);
         // Weights have a mean of one, so this is px² already.
         let variance = model.squares / Fit::freedom(samples, model).max(1.0);
-        let noise = libm::sqrtf(variance);
+        let noise = crate::kernel::sqrtf(variance);
         if noise.is_finite() {
             tones.sample_noise_px = noise;
-            tones.row_noise_px = noise * libm::sqrtf(f32::from(self.group.rows_per_sample()));
+            tones.row_noise_px =
+                noise * crate::kernel::sqrtf(f32::from(self.group.rows_per_sample()));
         }
         let (low, high) = self.asked_hz();
         let regressors = fit.weigh(samples, model);
@@ -79,7 +80,7 @@ impl Telling<'_> {
             if !(low..=high).contains(&hz) || attenuation < LEAST_ATTENUATION {
                 continue;
             }
-            let amplitude = libm::sqrtf(tone.amplitude.norm_sqr());
+            let amplitude = crate::kernel::sqrtf(tone.amplitude.norm_sqr());
             let unit = fit.deviation(&regressors, model, i, samples.length_s);
             let kept = samples.kept(&samples.frame_means(i + 1));
             let power = samples.total_weight * amplitude * amplitude / (4.0 * variance).max(1e-30);

@@ -5,6 +5,7 @@
 //! costs two multiplications a tone. What is left of a sample's own time (rows of a group weigh
 //! differently from frame to frame) is its skew, kept in small steps and applied to first order.
 
+use crate::time::since;
 use crate::timeline::{Group, Sample, Spread};
 
 /// Samples as they are collected: shift, weight and skew, 8 bytes a sample.
@@ -92,10 +93,10 @@ pub(crate) fn follow_spread(known: &mut Spread, now: Spread, first: bool, even: 
 
 /// A sample's time beyond that of its frame and slot, in skew units; saturates.
 pub(crate) fn skew_of(group: &Group, sample: &Sample, start_ns: i64) -> i16 {
-    let late = sample
-        .time_ns
-        .saturating_sub(start_ns)
-        .saturating_sub(group.middle_ns(sample.slot));
+    let late = since(
+        since(sample.time_ns, start_ns),
+        group.middle_ns(sample.slot),
+    );
     (late / skew_unit_ns(group)).clamp(i64::from(i16::MIN), i64::from(i16::MAX)) as i16
 }
 

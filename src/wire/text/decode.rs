@@ -253,7 +253,9 @@ fn read_reply(ok: bool, mut fields: Fields<'_>) -> Result<Reply, DecodeError> {
 
 /// The command in a `$RTCMD,…*hhhhhhhh` sentence, or `None` where it is not one or not intact.
 pub(crate) fn command_in_sentence(line: &str) -> Option<&str> {
-    let (body, sum) = line.strip_prefix('$')?.rsplit_once('*')?;
-    let intact = hexadecimal(sum, 8)? == CRC_32.checksum(body.as_bytes());
+    // Where the last `*` is, is known, for its sum is of eight digits.
+    let line = line.strip_prefix('$')?;
+    let (body, sum) = line.split_at_checked(line.len().checked_sub(9)?)?;
+    let intact = hexadecimal(sum.strip_prefix('*')?, 8)? == CRC_32.checksum(body.as_bytes());
     body.strip_prefix("RTCMD,").filter(|_| intact)
 }

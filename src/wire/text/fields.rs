@@ -82,9 +82,15 @@ pub(super) fn integer<T: TryFrom<u64>>(field: &str) -> Option<T> {
 
 /// Upper-case hexadecimal of exactly `digits` digits.
 pub(super) fn hexadecimal(field: &str, digits: usize) -> Option<u32> {
-    let upper = |b: u8| matches!(b, b'0'..=b'9' | b'A'..=b'F');
-    if field.len() != digits || !field.bytes().all(upper) {
+    if field.len() != digits {
         return None;
     }
-    u32::from_str_radix(field, 16).ok()
+    field.bytes().try_fold(0_u32, |value, byte| {
+        let digit = match byte {
+            b'0'..=b'9' => byte - b'0',
+            b'A'..=b'F' => byte - b'A' + 10,
+            _ => return None,
+        };
+        Some(value << 4 | u32::from(digit))
+    })
 }
