@@ -2,70 +2,17 @@
 //!
 //! `ROWTONE_PROGRAM` may name another build of it, words before it included: `qemu-aarch64 … rowtone-rpi`.
 
+mod common;
+
 use std::fs;
 use std::io::Read;
-use std::path::PathBuf;
-use std::process::{Child, Command, Output, Stdio};
+use std::process::{Output, Stdio};
 use std::time::{Duration, Instant};
 
+use common::{PATIENCE, Program, command, file, start, terminate};
 use rowtone::report::Report;
 use rowtone::wire::{Message, text};
-use serialport::{SerialPort, TTYPort};
-
-/// How long to wait for something to come at all: an emulated program on a busy machine takes its time.
-const PATIENCE: Duration = Duration::from_secs(120);
-
-/// The program, ended when the test fails.
-struct Program(Child);
-
-impl Drop for Program {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
-
-/// The program to test.
-fn command() -> Command {
-    let other = std::env::var("ROWTONE_PROGRAM").unwrap_or_default();
-    let mut words = other.split_whitespace();
-    let mut command = Command::new(words.next().unwrap_or(env!("CARGO_BIN_EXE_rowtone-rpi")));
-    command.args(words);
-    command
-}
-
-/// A configuration file of this test's own.
-fn file(name: &str, text: &str) -> PathBuf {
-    let name = format!("rowtone-rpi-{name}-{}.toml", std::process::id());
-    let path = std::env::temp_dir().join(name);
-    fs::write(&path, text).unwrap();
-    path
-}
-
-/// The program with its camera simulated and its line on a pseudo-terminal, of which our end and the other (to be
-/// kept, or the terminal hangs up) are given back.
-fn start(name: &str, measure: &str) -> (Program, TTYPort, TTYPort) {
-    let (mut ours, theirs) = TTYPort::pair().unwrap();
-    ours.set_timeout(Duration::from_millis(20)).unwrap();
-    let config = file(
-        name,
-        &format!(
-            "[camera]\nmode = \"160x120\"\nlearn_frames = 8\nexposure_us = 1\n[measure]\n{measure}\n\
-             [service]\nrealtime_priority = 0\nstate = \"/nonexistent/state\"\n"
-        ),
-    );
-    let child = command()
-        .args([
-            "--simulate",
-            "--output",
-            &theirs.name().unwrap(),
-            "--config",
-        ])
-        .arg(&config)
-        .stderr(Stdio::piped())
-        .spawn();
-    (Program(child.unwrap()), ours, theirs)
-}
+use serialport::TTYPort;
 
 /// Reports from a port, one by one.
 struct Reports<'a> {
@@ -101,15 +48,10 @@ impl<'a> Reports<'a> {
     }
 }
 
-fn terminate(program: &Program) {
-    let id = program.0.id().to_string();
-    let sent = Command::new("kill").args(["-TERM", &id]).status().unwrap();
-    assert!(sent.success());
-}
-
 #[test]
 fn sigterm_in_the_middle_of_a_window_sends_what_was_measured_and_exits_with_0() {
-    let (mut program, mut ours, _theirs) = start("sigterm", "window_s = 1.0\nhop_s = 1.0");
+    let (mut program, mut ours, _theirs) =
+        start("sigterm", "[measure]\nwindow_s = 1.0\nhop_s = 1.0");
     let mut reports = Reports::new(&mut ours);
     let patience = PATIENCE;
     reports.next(patience).expect("a first report");
@@ -140,6 +82,19 @@ fn sigterm_in_the_middle_of_a_window_sends_what_was_measured_and_exits_with_0() 
     assert!(reports.next(Duration::from_millis(100)).is_none());
 }
 
+/// There is nothing to send yet: it ends all the same, at once and in order.
+#[test]
+fn sigterm_before_the_first_report_ends_it() {
+    let (mut program, mut ours, _theirs) = start("early", "[measure]\nwindow_s = 5.0\nhop_s = 5.0");
+    // It has begun when it says something, or nothing within a second.
+    let mut reports = Reports::new(&mut ours);
+    assert!(reports.next(Duration::from_secs(1)).is_none());
+    let asked = Instant::now();
+    terminate(&program);
+    assert_eq!(program.0.wait().unwrap().code(), Some(0));
+    assert!(asked.elapsed() < Duration::from_secs(5));
+}
+
 /// Memory of the process that is in use, KiB.
 fn resident_kib(program: &Program) -> u64 {
     let status = fs::read_to_string(format!("/proc/{}/status", program.0.id())).unwrap();
@@ -150,7 +105,7 @@ fn resident_kib(program: &Program) -> u64 {
 
 #[test]
 fn memory_does_not_grow_once_reports_flow() {
-    let (program, mut ours, _theirs) = start("memory", "window_s = 0.2\nhop_s = 0.05");
+    let (program, mut ours, _theirs) = start("memory", "[measure]\nwindow_s = 0.2\nhop_s = 0.05");
     let mut reports = Reports::new(&mut ours);
     let mut resident = Vec::new();
     while resident.len() < 50 {
