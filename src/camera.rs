@@ -1,6 +1,9 @@
 //! What a camera delivers: lines, and when each was exposed.
 
-use crate::raw::UpperBytes;
+mod pixels;
+
+pub use pixels::{Pixels, UpperBytes};
+
 use core::fmt;
 
 /// When the rows of a frame are exposed.
@@ -95,62 +98,6 @@ impl fmt::Display for TimingError {
 }
 
 impl core::error::Error for TimingError {}
-
-/// The pixels of a line as the kernels read them.
-///
-/// Deeper pixels need no scaling: a line is only ever compared with its own reference.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Pixels<'a> {
-    /// 8-bit luma or raw.
-    U8(&'a [u8]),
-    /// 9- to 16-bit luma or raw, one pixel a word. Packed pixels are unpacked to it
-    /// ([`RawFormat::line`](crate::raw::RawFormat::line)).
-    U16(&'a [u16]),
-    /// The upper eight bits of packed or 16-bit raw pixels
-    /// ([`RawFormat::upper_line`](crate::raw::RawFormat::upper_line)).
-    Upper(UpperBytes<'a>),
-}
-
-impl<'a> Pixels<'a> {
-    /// Pixels in the line.
-    pub const fn len(&self) -> usize {
-        match self {
-            Self::U8(p) => p.len(),
-            Self::U16(p) => p.len(),
-            Self::Upper(p) => p.len(),
-        }
-    }
-
-    /// No pixel at all.
-    pub const fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-
-    /// `width` pixels from `first` on; `None` where the line ends before, or where `first` lies within pixels that share
-    /// bytes.
-    pub fn part(&self, first: usize, width: usize) -> Option<Self> {
-        let all = first..first.checked_add(width)?;
-        Some(match self {
-            Self::U8(p) => Self::U8(p.get(all)?),
-            Self::U16(p) => Self::U16(p.get(all)?),
-            Self::Upper(p) => Self::Upper(p.part(first, width)?),
-        })
-    }
-
-    /// The pixels' values, one after the other.
-    pub fn values(&self) -> impl Iterator<Item = u16> + use<'a> {
-        let (mut bytes, mut words, mut upper) = (None, None, None);
-        match *self {
-            Self::U8(p) => bytes = Some(p.iter().map(|&p| u16::from(p))),
-            Self::U16(p) => words = Some(p.iter().copied()),
-            Self::Upper(p) => upper = Some(p.iter().map(u16::from)),
-        }
-        let bytes = bytes.into_iter().flatten();
-        bytes
-            .chain(words.into_iter().flatten())
-            .chain(upper.into_iter().flatten())
-    }
-}
 
 /// One line of one frame, as it leaves the sensor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

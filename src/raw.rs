@@ -23,8 +23,6 @@
 
 mod upper;
 
-pub use upper::UpperBytes;
-
 use crate::camera::Pixels;
 use core::fmt;
 

@@ -1,71 +1,10 @@
 //! The upper eight bits of deeper pixels, read where they lie.
 
 use super::{RawError, RawFormat};
-use crate::camera::Pixels;
-use crate::kernel::{Kernel, Sums, spread::Spread};
-
-/// A line of packed or 16-bit pixels of which the upper eight bits count: one byte a pixel, beside bytes that do not.
-/// Made by [`RawFormat::upper_line`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct UpperBytes<'a> {
-    /// From the first pixel's group on; goes on behind the last where the camera's buffer does.
-    bytes: &'a [u8],
-    width: usize,
-    spread: Spread,
-}
-
-impl<'a> UpperBytes<'a> {
-    /// Pixels of the line.
-    pub const fn len(&self) -> usize {
-        self.width
-    }
-
-    /// No pixel at all.
-    pub const fn is_empty(&self) -> bool {
-        self.width == 0
-    }
-
-    /// The pixels, one after the other.
-    pub fn iter(&self) -> impl Iterator<Item = u8> + use<'a> {
-        self.spread.pixels(self.bytes, 0).take(self.width)
-    }
-
-    /// `width` pixels from `first` on; `None` where the line ends before, or where `first` lies within a group.
-    pub fn part(&self, first: usize, width: usize) -> Option<Self> {
-        if first.checked_add(width)? > self.width {
-            return None;
-        }
-        let bytes = self.bytes.get(self.spread.group_at(first)?..)?;
-        Some(Self {
-            bytes,
-            width,
-            ..*self
-        })
-    }
-
-    /// Σ h·p and Σ p with `coefficients`, one a pixel from the first on.
-    #[inline(always)]
-    pub(crate) fn sums(&self, kernel: Kernel, coefficients: &[i8]) -> Sums {
-        kernel.sums_spread(self.spread, self.bytes, coefficients)
-    }
-
-    /// Brings the pixels together in `line`. `None` where that is shorter. Best is [`RawFormat::UPPER_SPARE`] more than
-    /// the line: whole vectors are written then, and what stands behind the line is overwritten.
-    pub fn gather<'b>(&self, kernel: Kernel, line: &'b mut [u8]) -> Option<&'b [u8]> {
-        line.get(..self.width)?;
-        let done = kernel.gather(self.spread, self.bytes, line, self.width);
-        let line = line.get_mut(..self.width)?;
-        let rest = line.get_mut(done..)?;
-        let pixels = self.spread.pixels(self.bytes, done);
-        rest.iter_mut().zip(pixels).for_each(|(to, p)| *to = p);
-        Some(line)
-    }
-}
+use crate::camera::{Pixels, UpperBytes};
+use crate::kernel::spread::Spread;
 
 impl RawFormat {
-    /// Bytes behind a line that [`UpperBytes::gather`] likes to have.
-    pub const UPPER_SPARE: usize = 16;
-
     /// How the upper bytes lie, where they need only be picked.
     const fn spread(self) -> Option<Spread> {
         match self {
@@ -103,11 +42,7 @@ impl RawFormat {
         let has = bytes.len();
         let line = bytes.get(..needs).ok_or(RawError::Line { has, needs })?;
         if let Some(spread) = self.spread() {
-            return Ok(Pixels::Upper(UpperBytes {
-                bytes,
-                width,
-                spread,
-            }));
+            return Ok(Pixels::Upper(UpperBytes::new(bytes, width, spread)));
         }
         let shift = match self {
             Self::Raw10 => 2,
@@ -130,6 +65,7 @@ impl RawFormat {
 mod tests {
     use super::super::tests::pack;
     use super::*;
+    use crate::kernel::Kernel;
     use proptest::prelude::*;
     extern crate std;
     use std::{vec, vec::Vec};

@@ -29,10 +29,9 @@ pub use learn::{ColumnLearning, RowLearning};
 
 use crate::{
     band::Level,
-    camera::{Line, Pixels, Timing},
+    camera::{Line, Pixels, Timing, UpperBytes},
     noise::{NoiseMeter, PixelNoise},
     pixel::Pixel,
-    raw::UpperBytes,
     reference::{Recipe, RowTable},
     timeline::{Binner, Displacement, Sample},
 };
@@ -183,7 +182,7 @@ impl<'a> Tracker<'a> {
     }
 
     /// Lends the room that lines of [`Pixels::Upper`] need, which are brought together there when the motion is large:
-    /// a line's width, best [`RawFormat::UPPER_SPARE`](crate::raw::RawFormat::UPPER_SPARE) more. Without it
+    /// a line's width, best [`UpperBytes::SPARE`] more. Without it
     /// such lines are misfits.
     #[must_use]
     pub fn with_line_room(mut self, room: &'a mut [u8]) -> Self {

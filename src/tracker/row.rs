@@ -1,6 +1,6 @@
 //! A line as the tracker takes it: side by side in memory, or brought together only when it must be.
 
-use crate::{kernel::Kernel, pixel::Pixel, raw::UpperBytes};
+use crate::{camera::UpperBytes, kernel::Kernel, pixel::Pixel};
 
 /// The pixels of a line.
 pub(super) trait Row {

@@ -1,6 +1,6 @@
 //! All the memory that measuring takes, got once.
 
-use rowtone::raw::RawFormat;
+use rowtone::camera::UpperBytes;
 use rowtone::reference::RowTable;
 use rowtone::report::MAX_PEAKS;
 use rowtone::spectrum::{EstimatorStorage, FrameMark, SampleBuffer, Storage as SpectrumStorage};
@@ -37,7 +37,7 @@ impl TrackerMemory {
             columns: vec![ColumnLearning::default(); width],
             fresh: vec![0; width],
             scratch: vec![0.0; 2 * width],
-            line: vec![0; width + RawFormat::UPPER_SPARE],
+            line: vec![0; width + UpperBytes::SPARE],
         }
     }
 
