@@ -5,8 +5,12 @@
 //! where the sensitivity comes from.
 
 mod binner;
+mod group;
+mod ladder;
 
-pub use binner::{Binner, BinnerError, Group, rows_per_sample};
+pub use binner::Binner;
+pub(crate) use binner::RowShift;
+pub use group::{BinnerError, Group, rows_per_sample};
 
 /// How far one row is shifted against its reference.
 #[derive(Clone, Copy, Debug, PartialEq)]

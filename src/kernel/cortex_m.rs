@@ -14,7 +14,7 @@ const BLOCK: usize = 1 << 16;
 /// Pixels a turn of the long loop.
 const TURN: usize = 64;
 
-#[inline]
+#[inline(always)]
 pub(super) fn sums_u8(pixels: &[u8], coefficients: &[i8]) -> Sums {
     let n = pixels.len().min(coefficients.len());
     if n > BLOCK {

@@ -157,7 +157,7 @@ impl Kernel {
 
     /// Sums over 8-bit pixels. The shorter length of the two counts. |h| ≤ [`MAX_COEFFICIENT`], or the
     /// sums are unspecified (never unsafe).
-    #[inline]
+    #[inline(always)]
     pub fn sums_u8(self, pixels: &[u8], coefficients: &[i8]) -> Sums {
         match self.0 {
             Kind::Portable => portable::sums_u8(pixels, coefficients),

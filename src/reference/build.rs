@@ -42,6 +42,9 @@ const RING: usize = ENERGY_COLUMNS.next_power_of_two();
 /// Whole shifts either way at which the phase-correlation function is taken.
 const LAGS: usize = DERIVATIVE.len();
 
+/// A column of a correlation is so many times less work than one of another step.
+const CORRELATED: usize = 4;
+
 /// The buffers of one row, all of its width.
 #[derive(Debug)]
 pub struct Parts<'a> {
@@ -209,10 +212,19 @@ impl Build {
                 let Some(q) = self.q.get_mut(lag) else {
                     return Some(self.expand());
                 };
-                let by = lag as isize - LAGS as isize;
-                *q = correlation(&self.recipe, parts.mean, parts.coefficients, by);
-                self.step = Step::Correlate(lag + 1);
-                self.column = 0;
+                let lag_steps = lag as isize - LAGS as isize;
+                let shared = width.saturating_sub(lag_steps.unsigned_abs() * self.recipe.stride);
+                let end = span
+                    .start
+                    .saturating_add(columns.saturating_mul(CORRELATED));
+                let span = span.start..end.min(shared);
+                self.column = span.end;
+                let recipe = &self.recipe;
+                *q += correlation(recipe, parts.mean, parts.coefficients, lag_steps, &span);
+                if span.end == shared {
+                    self.step = Step::Correlate(lag + 1);
+                    self.column = 0;
+                }
                 return None;
             }
         };
@@ -484,16 +496,25 @@ fn nearest(v: f32) -> f32 {
     (v + POINT_AT_THE_END) - POINT_AT_THE_END
 }
 
-/// Σ h(x)·r(x − lag·stride), in pixel values.
-fn correlation(recipe: &Recipe, mean: &[u16], coefficients: &[i8], lag: isize) -> f32 {
+/// Σ h(x)·r(x − lag·stride) over these of the columns that both have, in pixel values.
+fn correlation(
+    recipe: &Recipe,
+    mean: &[u16],
+    coefficients: &[i8],
+    lag: isize,
+    span: &Range<usize>,
+) -> f32 {
     let by = lag.unsigned_abs() * recipe.stride;
-    let rest = mean.len().saturating_sub(by);
     let (mean, coefficients) = if lag >= 0 {
-        (mean.get(..rest), coefficients.get(by..))
+        (Some(mean), coefficients.get(by..))
     } else {
-        (mean.get(by..), coefficients.get(..rest))
+        (mean.get(by..), Some(coefficients))
     };
-    let (Some(mean), Some(coefficients)) = (mean, coefficients) else {
+    let cut = (
+        mean.and_then(|m| m.get(span.clone())),
+        coefficients.and_then(|c| c.get(span.clone())),
+    );
+    let (Some(mean), Some(coefficients)) = cut else {
         return 0.0;
     };
     recipe.kernel.sums_u16(mean, coefficients).product as f32 / recipe.counts_per_value

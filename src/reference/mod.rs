@@ -46,6 +46,7 @@ pub struct RowTable {
 
 impl RowTable {
     /// What the row knows of its shift, 1/px²; 0 where it has too little texture to be measured.
+    #[inline(always)]
     pub fn information_per_px2(&self) -> f32 {
         f32::from_bits(u32::from(self.information) << 16)
     }
@@ -58,13 +59,21 @@ impl RowTable {
     }
 
     /// Σ r over the whole row, in pixel values.
+    #[inline(always)]
     pub fn pixel_sum(&self) -> f32 {
         self.pixel_sum
     }
 
+    /// The factor that brings a line of this `pixel_sum` to the reference's brightness.
+    #[inline(always)]
+    pub(crate) fn factor_to_reference(&self, pixel_sum: f32) -> f32 {
+        // A black line has no brightness to divide by, and no texture to measure.
+        at_least_1(self.pixel_sum) / at_least_1(pixel_sum)
+    }
+
     /// The shift for `product` = Σ h·p/g of a line whose brightness is g times the reference's, px;
     /// right within ± 0.7 px or so.
-    #[inline]
+    #[inline(always)]
     pub fn shift_px(&self, product: f32) -> f32 {
         let offset_px = f32::from(self.offset) * (1.0 / OFFSETS_PER_PX);
         let (quadratic, cubic) = self.inverse();
@@ -85,13 +94,19 @@ impl RowTable {
     }
 
     /// The coefficients of u² in px⁻¹ and of u³ in px⁻².
-    #[inline]
+    #[inline(always)]
     fn inverse(&self) -> (f32, f32) {
         (
             f32::from(self.quadratic) * (1.0 / QUADRATICS),
             f32::from(self.cubic) * (1.0 / CUBICS),
         )
     }
+}
+
+/// 1 for NaN; `f32::max` takes a microcontroller twice as long.
+#[inline(always)]
+pub(crate) fn at_least_1(v: f32) -> f32 {
+    if v > 1.0 { v } else { 1.0 }
 }
 
 #[cfg(test)]

@@ -5,11 +5,10 @@
 //! frame's end. A group of which less than half of the rows could be measured gives no sample: its
 //! rows' own offsets would no longer be those of the other frames.
 
-use core::fmt;
-
-use super::{Displacement, Sample, Spread};
-use crate::camera::Timing;
-use crate::spectrum::sin;
+use super::{
+    Displacement, Group, Sample, Spread,
+    ladder::{Ladder, Moments},
+};
 
 /// Rows of a sample are combined by their information, so none may be worth more than this, 1/px².
 const MOST_INFORMATION: f32 = 1e18;
@@ -17,240 +16,58 @@ const MOST_INFORMATION: f32 = 1e18;
 /// Longest frame gap that is still counted as lost frames: beyond it the camera was restarted.
 const LONGEST_LOSS: u32 = 100_000;
 
-/// How many rows make a sample, so that `max_hz` is sampled well and `capacity` samples hold `frames` frames.
-///
-/// Samples lie at most `0.45 / max_hz` apart (a tenth above two a period); where that would take more
-/// than `capacity` samples, rows are combined further and the highest frequency falls with it.
-/// A global shutter has one sample a frame.
-///
-/// ```
-/// use rowtone::{camera::Timing, timeline::rows_per_sample};
-/// let timing = Timing::new(18_900_000, 500_000, 1080)?;
-/// assert_eq!(rows_per_sample(timing, 1000.0, 47, 65_536), 23); // 435 µs
-/// assert_eq!(rows_per_sample(timing, 1000.0, 47, 1_024), 52); // 21 samples a frame at most
-/// # Ok::<(), rowtone::camera::TimingError>(())
-/// ```
-pub fn rows_per_sample(timing: Timing, max_hz: f32, frames: u32, capacity: usize) -> u16 {
-    if timing.is_global_shutter() {
-        return timing.rows();
-    }
-    let spacing_ps = 0.45e12 / max_hz.max(1e-3);
-    // The cast saturates, NaN becomes 0.
-    let wanted = (spacing_ps / timing.line_time_ps() as f32) as u16;
-    let a_frame = (capacity / (frames.max(1) as usize)).max(1);
-    let least = (timing.rows() as usize).div_ceil(a_frame);
-    wanted.max(least as u16).clamp(1, timing.rows())
+/// A row and what is known of it: information greater than 0, both finite.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct RowShift {
+    pub(crate) frame: u32,
+    pub(crate) row: u16,
+    pub(crate) shift_px: f32,
+    pub(crate) information_per_px2: f32,
 }
-
-/// Where and how long the groups of rows are.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Group {
-    timing: Timing,
-    rows_per_sample: u16,
-}
-
-impl Group {
-    /// Groups of `rows_per_sample` rows; a global shutter has one group a frame whatever is asked for.
-    ///
-    /// # Errors
-    /// [`BinnerError::RowsPerSample`] when it is 0 or more than a frame has.
-    pub const fn new(timing: Timing, rows_per_sample: u16) -> Result<Self, BinnerError> {
-        if timing.is_global_shutter() {
-            return Ok(Self {
-                timing,
-                rows_per_sample: timing.rows(),
-            });
-        }
-        if rows_per_sample == 0 || rows_per_sample > timing.rows() {
-            return Err(BinnerError::RowsPerSample {
-                given: rows_per_sample,
-                rows: timing.rows(),
-            });
-        }
-        Ok(Self {
-            timing,
-            rows_per_sample,
-        })
-    }
-
-    /// The camera's timing.
-    pub const fn timing(&self) -> Timing {
-        self.timing
-    }
-
-    /// Rows of a group (the last of a frame may have fewer).
-    pub const fn rows_per_sample(&self) -> u16 {
-        self.rows_per_sample
-    }
-
-    /// Groups a frame.
-    pub const fn slots(&self) -> u16 {
-        self.timing.rows().div_ceil(self.rows_per_sample)
-    }
-
-    /// Rows of this group.
-    pub const fn rows_of(&self, slot: u16) -> u16 {
-        let first = slot as u32 * self.rows_per_sample as u32;
-        let left = (self.timing.rows() as u32).saturating_sub(first);
-        if left < self.rows_per_sample as u32 {
-            left as u16
-        } else {
-            self.rows_per_sample
-        }
-    }
-
-    /// Middle of the group after the start of exposure of row 0, ns.
-    pub const fn middle_ns(&self, slot: u16) -> i64 {
-        let first = slot as i64 * self.rows_per_sample as i64;
-        let rows = self.rows_of(slot) as i64;
-        let middle_ps =
-            (2 * first + rows.saturating_sub(1)) * self.timing.line_time_ps() as i64 / 2;
-        middle_ps / 1000 + (self.timing.exposure_ns() / 2) as i64
-    }
-
-    /// Time from a group to the next, ns (0 with a global shutter).
-    pub const fn spacing_ns(&self) -> i64 {
-        self.rows_per_sample as i64 * self.timing.line_time_ps() as i64 / 1000
-    }
-
-    /// How the times of a group's rows lie about their middle where all know the same.
-    pub const fn even_spread(&self) -> Spread {
-        let (rows, line_ns) = (
-            self.rows_per_sample as f32,
-            self.timing.line_time_ps() as f32 * 1e-3,
-        );
-        Spread {
-            variance_ns2: (rows * rows - 1.0) / 12.0 * line_ns * line_ns,
-            third_ns3: 0.0,
-        }
-    }
-
-    /// What is left of a tone's amplitude after the exposure and the averaging of a group's rows, 0 to 1:
-    /// sinc(f·t_exp) · sin(πfRτ)/(R·sin(πfτ)), R rows of line time τ.
-    pub fn attenuation(&self, hz: f32) -> f32 {
-        use core::f32::consts::PI;
-        let exposure = PI * hz * self.timing.exposure_ns() as f32 * 1e-9;
-        let open = if exposure.abs() < 1e-3 {
-            1.0
-        } else {
-            sin(exposure) / exposure
-        };
-        let line = PI * hz * self.timing.line_time_ps() as f32 * 1e-12;
-        let rows = self.rows_per_sample as f32;
-        let narrow = sin(line) * rows;
-        let rowed = if narrow.abs() < 1e-6 {
-            1.0
-        } else {
-            sin(line * rows) / narrow
-        };
-        (open * rowed).abs()
-    }
-}
-
-/// Why a [`Group`] was refused.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum BinnerError {
-    /// Rows a sample must be from 1 to the rows of a frame.
-    RowsPerSample {
-        /// What was asked for.
-        given: u16,
-        /// Rows of a frame.
-        rows: u16,
-    },
-}
-
-impl fmt::Display for BinnerError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::RowsPerSample { given, rows } => {
-                write!(
-                    f,
-                    "rows per sample must be from 1 to the frame's {rows}, not {given}"
-                )
-            }
-        }
-    }
-}
-
-impl core::error::Error for BinnerError {}
 
 /// The group being filled.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 struct Open {
     frame: u32,
     slot: u16,
-    /// First row of the group and how many it should have.
     first_row: u16,
-    rows_due: u16,
-    /// Rows taken.
-    rows: u16,
+    /// The row that comes next.
+    next_row: u16,
+    /// The row behind the group's last; 0 while there is no group.
+    end_row: u16,
+    /// Rows that did not come.
+    missing: u16,
+    /// Middle of the exposure of the first row, ns; whether it came or not.
     first_ns: i64,
-    information: f32,
+    information: Ladder,
     weighted_shift: f32,
-    weighted_ns: f32,
-    /// Σ w·x, w·x², w·x³; x in rows from the group's middle, which is at this row.
-    middle_row: f32,
-    moments: [f32; 3],
+    /// Σ information·(how much later a row was exposed than its place says, ns).
+    weighted_later: f32,
 }
 
 impl Open {
-    fn spread(&self, group: &Group) -> Spread {
-        let line_ns = group.timing.line_time_ps() as f32 * 1e-3;
-        let per_information = 1.0 / self.information;
-        let [first, second, third] = self.moments.map(|m| m * per_information);
-        let variance = (second - first * first).max(0.0) * line_ns * line_ns;
-        let third = third - first * (3.0 * second - 2.0 * first * first);
-        Spread {
-            variance_ns2: variance,
-            third_ns3: third * line_ns * line_ns * line_ns,
-        }
-    }
-}
-
-impl Open {
-    /// Takes one row of this group.
+    /// Takes the row that comes next.
     #[inline(always)]
-    fn add(&mut self, d: &Displacement) {
-        let information = if d.information_per_px2 < MOST_INFORMATION {
-            d.information_per_px2
-        } else {
-            MOST_INFORMATION
-        };
-        // A group lasts some ms; converting 64 bits takes a microcontroller long.
-        let later_ns = d.time_ns.wrapping_sub(self.first_ns);
-        let later_ns = if later_ns == i64::from(later_ns as i32) {
-            later_ns as i32 as f32
-        } else {
-            much_later_ns(d.time_ns, self.first_ns)
-        };
-        self.rows = self.rows.saturating_add(1);
-        self.information += information;
-        self.weighted_shift += information * d.shift_px;
-        self.weighted_ns += information * later_ns;
-        let x = f32::from(d.row) - self.middle_row;
-        let mut power = information;
-        for moment in &mut self.moments {
-            power *= x;
-            *moment += power;
-        }
+    fn add(&mut self, row: RowShift) {
+        self.next_row = row.row.wrapping_add(1);
+        self.weighted_shift += row.information_per_px2 * row.shift_px;
+        self.information.add(row.information_per_px2);
     }
-}
 
-#[cold]
-#[inline(never)]
-fn much_later_ns(time_ns: i64, first_ns: i64) -> f32 {
-    time_ns.saturating_sub(first_ns) as f32
-}
+    /// Rows up to `row` do not come.
+    fn skip_to(&mut self, row: u16) {
+        let rows = row.saturating_sub(self.next_row);
+        self.missing = self.missing.saturating_add(rows);
+        self.information.skip(rows);
+        self.next_row = row;
+    }
 
-#[cold]
-#[inline(never)]
-fn rounded_ns(ns: f32) -> i64 {
-    libm::roundf(ns) as i64
-}
-
-/// A row of which something is known.
-fn is_known(information: f32, shift_px: f32) -> bool {
-    information > 0.0 && information.is_finite() && shift_px.is_finite()
+    /// At least half of its rows came.
+    fn is_thick(&self) -> bool {
+        let passed = self.next_row.wrapping_sub(self.first_row);
+        let came = u32::from(passed.wrapping_sub(self.missing));
+        2 * came >= u32::from(self.end_row.wrapping_sub(self.first_row))
+    }
 }
 
 /// Combines rows to samples.
@@ -273,7 +90,9 @@ fn is_known(information: f32, shift_px: f32) -> bool {
 #[derive(Clone, Debug)]
 pub struct Binner {
     group: Group,
-    open: Option<Open>,
+    open: Open,
+    /// Line time, ns.
+    line_ns: f32,
     last_frame: Option<u32>,
     lost_frames: u32,
     thin_groups: u32,
@@ -281,10 +100,11 @@ pub struct Binner {
 
 impl Binner {
     /// A binner for these groups.
-    pub const fn new(group: Group) -> Self {
+    pub fn new(group: Group) -> Self {
         Self {
             group,
-            open: None,
+            open: Open::default(),
+            line_ns: group.timing().line_time_ps() as f32 * 1e-3,
             last_frame: None,
             lost_frames: 0,
             thin_groups: 0,
@@ -293,87 +113,138 @@ impl Binner {
 
     /// Takes one row; gives the group before it, if this row begins another.
     ///
-    /// A row that knows nothing (information not greater than 0, or anything not finite) is skipped.
-    #[inline(always)]
-    pub fn push(&mut self, displacement: Displacement) -> Option<Sample> {
-        let known = is_known(displacement.information_per_px2, displacement.shift_px);
-        if known && displacement.row < self.group.timing.rows() {
-            return self.push_sound(displacement);
+    /// A row that knows nothing (information not greater than 0, or anything not finite) is skipped, and so is
+    /// one that comes after a later one of its group.
+    pub fn push(&mut self, d: Displacement) -> Option<Sample> {
+        let (shift_px, information) = (d.shift_px, d.information_per_px2);
+        let known = information > 0.0 && information.is_finite() && shift_px.is_finite();
+        if !known || d.row >= self.group.timing().rows() {
+            self.count_lost(d.frame);
+            return if self.is_open_for(d.frame, d.row) {
+                None
+            } else {
+                self.finish()
+            };
         }
-        self.skip(&displacement)
-    }
-
-    /// Counts a row of which nothing is known, and ends the group that it does not belong to.
-    #[cold]
-    fn skip(&mut self, d: &Displacement) -> Option<Sample> {
-        self.count_lost(d.frame);
-        let slot = d.row / self.group.rows_per_sample;
-        match self.open {
-            Some(open) if open.frame == d.frame && open.slot == slot => None,
-            _ => self.finish(),
-        }
-    }
-
-    /// [`Binner::push`] for a row of this timing whose shift and information are finite and greater than 0.
-    #[inline(always)]
-    pub(crate) fn push_sound(&mut self, d: Displacement) -> Option<Sample> {
-        if let Some(open) = &mut self.open
-            && open.frame == d.frame
-            && d.row.wrapping_sub(open.first_row) < open.rows_due
-        {
-            open.add(&d);
+        if self.is_open_for(d.frame, d.row) && d.row < self.open.next_row {
             return None;
         }
-        self.begin(d)
+        let row = RowShift {
+            frame: d.frame,
+            row: d.row,
+            shift_px,
+            information_per_px2: information.min(MOST_INFORMATION),
+        };
+        let done = self.push_row(row, || d.time_ns);
+        let place = self.group.timing().start_ns(d.row - self.open.first_row);
+        let later_ns = d
+            .time_ns
+            .saturating_sub(self.open.first_ns.saturating_add(place));
+        self.note_later(row.information_per_px2, later_ns as f32);
+        done
     }
 
-    /// Gives the group before, and begins the next with this row.
+    /// [`Binner::push`] for a row of this timing that is exposed when its place says. `middle_ns`: middle of
+    /// its exposure, on the camera's clock; asked where a group begins.
+    #[inline(always)]
+    pub(crate) fn push_row(
+        &mut self,
+        row: RowShift,
+        middle_ns: impl Fn() -> i64,
+    ) -> Option<Sample> {
+        let open = &mut self.open;
+        if row.row == open.next_row && row.row < open.end_row && row.frame == open.frame {
+            open.add(row);
+            return None;
+        }
+        self.push_elsewhere(row, middle_ns())
+    }
+
+    /// The row pushed last was exposed so much later than its place says, ns.
+    #[inline]
+    pub(crate) fn note_later(&mut self, information_per_px2: f32, later_ns: f32) {
+        self.open.weighted_later += information_per_px2 * later_ns;
+    }
+
+    fn is_open_for(&self, frame: u32, row: u16) -> bool {
+        frame == self.open.frame && (self.open.first_row..self.open.end_row).contains(&row)
+    }
+
+    /// A row that is not the next of its group.
     #[inline(never)]
-    fn begin(&mut self, d: Displacement) -> Option<Sample> {
-        self.count_lost(d.frame);
-        let slot = d.row / self.group.rows_per_sample;
+    fn push_elsewhere(&mut self, row: RowShift, middle_ns: i64) -> Option<Sample> {
+        if self.is_open_for(row.frame, row.row) {
+            if row.row >= self.open.next_row {
+                self.open.skip_to(row.row);
+                self.open.add(row);
+            }
+            return None;
+        }
         let done = self.finish();
-        let mut open = Open {
-            frame: d.frame,
-            slot,
-            first_row: slot * self.group.rows_per_sample,
-            rows_due: self.group.rows_of(slot),
-            rows: 0,
-            first_ns: d.time_ns,
-            information: 0.0,
-            weighted_shift: 0.0,
-            weighted_ns: 0.0,
-            middle_row: f32::from(slot * self.group.rows_per_sample)
-                + 0.5 * f32::from(self.group.rows_per_sample - 1),
-            moments: [0.0; 3],
-        };
-        open.add(&d);
-        self.open = Some(open);
+        if self.open.frame != row.frame || self.last_frame.is_none() {
+            self.count_lost(row.frame);
+        }
+        let slot = row.row / self.group.rows_per_sample();
+        let open = &mut self.open;
+        open.frame = row.frame;
+        open.slot = slot;
+        open.first_row = slot * self.group.rows_per_sample();
+        open.end_row = open.first_row + self.group.rows_of(slot);
+        open.missing = row.row - open.first_row;
+        open.first_ns = middle_ns;
+        if open.missing > 0 {
+            let before_ns = self.group.timing().start_ns(open.missing);
+            open.first_ns = middle_ns.saturating_sub(before_ns);
+        }
+        open.information = Ladder::default();
+        open.weighted_shift = 0.0;
+        open.weighted_later = 0.0;
+        open.add(row);
         done
     }
 
     /// Gives the group being filled: at the end of the input.
     pub fn finish(&mut self) -> Option<Sample> {
-        let open = self.open.take()?;
-        if 2 * u32::from(open.rows) < u32::from(open.rows_due) {
+        let open = &mut self.open;
+        if open.end_row == 0 {
+            return None;
+        }
+        let thick = open.is_thick();
+        open.end_row = 0;
+        if !thick {
             self.thin_groups = self.thin_groups.saturating_add(1);
             return None;
         }
-        let shift_px = open.weighted_shift / open.information;
-        let later_ns = open.weighted_ns / open.information;
+        let information_per_px2 = open.information.weight();
+        let per_information = 1.0 / information_per_px2;
+        let shift_px = open.weighted_shift * per_information;
+        if !shift_px.is_finite() {
+            return None;
+        }
+        let Moments {
+            to_next,
+            variance,
+            third,
+        } = open.information.moments(per_information);
+        let rows = f32::from(open.next_row.wrapping_sub(open.first_row)) - to_next;
+        let later_ns = rows * self.line_ns + open.weighted_later * per_information;
         let later_ns = if later_ns.abs() < 1e9 {
             // The nearest, as fast as a cast.
             i64::from((later_ns + 0.5f32.copysign(later_ns)) as i32)
         } else {
             rounded_ns(later_ns)
         };
-        (shift_px.is_finite() && open.information.is_finite()).then_some(Sample {
+        let line_ns2 = self.line_ns * self.line_ns;
+        Some(Sample {
             frame: open.frame,
             slot: open.slot,
             time_ns: open.first_ns.saturating_add(later_ns),
             shift_px,
-            information_per_px2: open.information,
-            spread: open.spread(&self.group),
+            information_per_px2,
+            spread: Spread {
+                variance_ns2: variance * line_ns2,
+                third_ns3: third * line_ns2 * self.line_ns,
+            },
         })
     }
 
@@ -399,10 +270,17 @@ impl Binner {
     }
 }
 
+#[cold]
+#[inline(never)]
+fn rounded_ns(ns: f32) -> i64 {
+    libm::roundf(ns) as i64
+}
+
 #[cfg(test)]
 mod tests {
     extern crate std;
     use super::*;
+    use crate::camera::Timing;
 
     fn group() -> Group {
         Group::new(Timing::new(10_000_000, 0, 8).unwrap(), 4).unwrap()
@@ -456,6 +334,25 @@ mod tests {
         }
         assert_eq!(binner.push(row(0, 4, 1.0, 1.0)), None);
         assert_eq!(binner.thin_groups(), 1);
+    }
+
+    #[test]
+    fn rows_left_out_and_rows_twice_do_not_move_the_others() {
+        let mut binner = Binner::new(group());
+        for y in [1, 3, 3, 2] {
+            assert_eq!(binner.push(row(5, y, f32::from(y), 1.0)), None);
+        }
+        let sample = binner.push(row(5, 5, 0.0, 1.0)).unwrap();
+        assert_eq!(
+            (sample.shift_px, sample.time_ns, sample.information_per_px2),
+            (2.0, 5_020_000, 2.0)
+        );
+        assert_eq!(sample.spread.variance_ns2, 1e8);
+        // A row that is exposed later than its place says.
+        let mut late = row(5, 6, 0.0, 1.0);
+        late.time_ns += 4000;
+        binner.push(late);
+        assert_eq!(binner.finish().unwrap().time_ns, 5_057_000);
     }
 
     #[test]

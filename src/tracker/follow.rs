@@ -19,7 +19,7 @@ pub(super) struct Follow {
     /// Where the picture is on average, px: a mean over some seconds.
     drift_px: f32,
     /// By how much the reference was moved after a creeping picture, px.
-    anchor_px: i32,
+    anchor_px: f32,
 }
 
 /// What is under way.
@@ -39,16 +39,17 @@ enum Work {
     Move { by_px: i32, next: usize },
 }
 
-/// One row in so many frames takes a little of the picture: building its coefficients anew is what costs.
-const FRAMES_A_ROW: u32 = 4;
+/// One row in so many frames takes a little of the picture: building its coefficients anew is what costs. All
+/// 240 rows at 60 fps have had their turn in a minute, and the reference forgets over a quarter of an hour.
+const FRAMES_A_ROW: u32 = 16;
 
-/// The reference forgets over so many turns of a row.
-const MEMORY_FRAMES: u16 = 32;
+/// The reference forgets over so many turns of a row: its noise is then that of twice as many frames.
+const MEMORY_FRAMES: u16 = 16;
 
 impl Follow {
     #[inline(always)]
     pub(super) fn anchor_px(&self) -> f32 {
-        self.anchor_px as f32
+        self.anchor_px
     }
 
     pub(super) fn is_busy(&self) -> bool {
@@ -107,14 +108,17 @@ impl Tracker<'_> {
                 column,
             } => {
                 let row = *row;
+                if *column == width {
+                    let build = self.build_of(row);
+                    self.follow.work = Work::Build { row, build };
+                    return 0.0;
+                }
+                // Six pixels go into one.
+                let columns = columns.div_ceil(2);
                 let span = *column..column.saturating_add(columns).min(width);
                 *column = span.end;
                 if let Some(mean) = s.mean.get_mut(row * width..(row + 1) * width) {
-                    averaging.some::<P>(span.clone(), mean, s.scratch);
-                }
-                if span.end == width {
-                    let build = self.build_of(row);
-                    self.follow.work = Work::Build { row, build };
+                    averaging.some::<P>(span, mean, s.scratch);
                 }
             }
             Work::Build { row, build } => {
@@ -199,7 +203,7 @@ impl Tracker<'_> {
         let by_px = stride * if self.follow.drift_px > 0.0 { 1 } else { -1 };
         // A row that is being followed will have another turn.
         self.follow.work = Work::Move { by_px, next: 0 };
-        self.follow.anchor_px = self.follow.anchor_px.saturating_add(by_px);
+        self.follow.anchor_px += by_px as f32;
         self.follow.drift_px -= by_px as f32;
         self.prediction.move_by(-by_px as f32);
     }

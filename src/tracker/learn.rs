@@ -1,6 +1,6 @@
 //! Learning the reference, in two rounds of frames.
 
-use super::{Found, Stage, Tracker, follow::Follow, predict::Prediction, watch::Watch};
+use super::{Left, Place, Stage, Tracker, follow::Follow, predict::Prediction, watch::Watch};
 use crate::{
     align::{self, Averaging},
     band::{Level, MAX_HALF},
@@ -54,6 +54,7 @@ impl Tracker<'_> {
         let values = 32768.0 / self.recipe.counts_per_value;
         self.stage = Stage::Rough;
         self.frame = None;
+        self.quiet.end();
         self.frames_in_stage = 0;
         self.range_px = 0.0;
         self.to_reference = 1.0;
@@ -105,25 +106,26 @@ impl Tracker<'_> {
         self.range_px = 0.0;
         self.frames_in_stage = 0;
         self.frame = None;
+        self.quiet.end();
     }
 
     /// Aligns a line and averages it into its reference.
     ///
     /// `found`: its own shift. In the first frame nothing is known, so no row has texture: it is not moved.
     #[cold]
-    pub(super) fn learn<P: Pixel>(&mut self, row: usize, pixels: &[P], found: Found) {
+    pub(super) fn learn<P: Pixel>(&mut self, row: usize, pixels: &[P], found: Result<Place, Left>) {
         let mut textured = false;
         let shift_px = match found {
-            Found::At {
+            Ok(Place {
                 shift_px,
                 information_per_px2,
-            } if information_per_px2 > OWN_INFORMATION_PER_PX2 => {
+            }) if information_per_px2 > OWN_INFORMATION_PER_PX2 => {
                 textured = true;
                 self.prediction.note_extent(shift_px, information_per_px2);
                 shift_px
             }
-            Found::At { .. } | Found::NoTexture => self.prediction.at(row),
-            Found::Disturbed => return,
+            Ok(_) | Err(Left::NoTexture) => self.prediction.at(row),
+            Err(_) => return,
         };
         let Some(&seen) = self.storage.learning.get(row) else {
             return;

@@ -55,13 +55,38 @@ impl Prediction {
     const ROWS: u16 = 4;
 
     /// Shift expected for this row, px.
-    #[inline(always)]
+    #[inline]
     pub(super) fn at(&self, row: usize) -> f32 {
         if self.swift_frames == 0 {
             return self.shift_px;
         }
         let rows = f32::from((row as u16).saturating_sub(self.row).min(Self::ROWS));
         self.shift_px + rows * (self.speed_px + 0.5 * rows * self.change_px)
+    }
+
+    /// The motion is not swift, and this frame has had its first row: [`Prediction::at`] is the same for all
+    /// rows.
+    pub(super) fn is_at_rest(&self) -> bool {
+        self.swift_frames == 0 && !self.gap.is_open()
+    }
+
+    /// [`Prediction::at`] of a motion that [`Prediction::is_at_rest`], px.
+    #[inline(always)]
+    pub(super) fn rest_px(&self) -> f32 {
+        self.shift_px
+    }
+
+    /// A row that is so far from where it was expected leaves the motion at rest.
+    #[inline(always)]
+    pub(super) fn is_small(surprise_px: f32) -> bool {
+        surprise_px * surprise_px <= Self::SWIFT_PX2
+    }
+
+    /// [`Prediction::add`] of a row that leaves the motion at rest: so far from where it was expected.
+    #[inline(always)]
+    pub(super) fn add_at_rest(&mut self, surprise_px: f32, information: f32) {
+        self.information = self.information * Self::KEEP + information;
+        self.shift_px += surprise_px * (information / self.information);
     }
 
     /// The motion is large and swift.
@@ -104,23 +129,7 @@ impl Prediction {
     }
 
     /// Takes what a row came to.
-    #[inline(always)]
     pub(super) fn add(&mut self, row: usize, shift_px: f32, information: f32) {
-        let surprise = shift_px - self.shift_px;
-        let square = surprise * surprise;
-        if self.swift_frames != 0 || square > Self::SWIFT_PX2 || self.gap.is_open() {
-            self.add_swift(row, shift_px, information);
-        } else {
-            // The common case of the below, in a straight line.
-            self.information = self.information * Self::KEEP + information;
-            self.shift_px += surprise * (information / self.information);
-            self.last_px = [shift_px, self.last_px[0]];
-            self.row = row as u16;
-        }
-    }
-
-    #[inline(never)]
-    fn add_swift(&mut self, row: usize, shift_px: f32, information: f32) {
         let expected = self.at(row);
         let surprise = shift_px - expected;
         let square = surprise * surprise;
@@ -136,8 +145,7 @@ impl Prediction {
             }
         }
         if self.swift_frames == 0 {
-            self.information = self.information * Self::KEEP + information;
-            self.shift_px += surprise * (information / self.information);
+            self.add_at_rest(surprise, information);
         } else {
             self.information = self.information * Self::KEEP_SWIFT + information;
             let share = information / self.information;

@@ -2,8 +2,8 @@
 //! noise, blur and real sensors is measured by `rowtone sweep lines` and the end-to-end tests.
 
 use super::*;
-use crate::band::MAX_HALF;
 use crate::raw::RawFormat;
+use crate::{band::MAX_HALF, camera::Timing};
 extern crate std;
 use std::{vec, vec::Vec};
 
@@ -329,7 +329,7 @@ fn a_shift_beyond_all_bounds_overflows_nothing() {
         let line = [100u8; WIDTH];
         for huge in [2e9, 5e9, 1e19, f32::MAX, f32::INFINITY] {
             for huge in [huge, -huge] {
-                if let Ok(shift_px) = tracker.correlate(3, &table, &mut &line[..], huge) {
+                if let Ok(shift_px) = tracker.correlate(3, &table, &mut &line[..], huge, None) {
                     assert!(shift_px.abs() <= WIDTH as f32);
                 }
                 assert!(tracker.rest(3, &line, huge).is_none());
@@ -401,7 +401,7 @@ fn in_a_hurry_a_creeping_picture_is_followed_row_by_row() {
         built.copy_from_slice(tracker.storage.tables);
     }
     assert!(tracker.follow.anchor_px() >= 3.0);
-    assert!(rebuilt > 20, "{rebuilt} rows");
+    assert!(rebuilt > 10, "{rebuilt} rows");
 }
 
 #[test]

@@ -15,9 +15,9 @@ use crate::{noise::LEAST_VARIANCE, pixel::Pixel, reference::RowTable};
 /// In tracking one row in this many is looked at even if it does not surprise.
 const EVERY: usize = 32;
 
-/// Columns that are looked at, about; where a line time is short, so many for each that is built beside it.
+/// Columns that are looked at, about, and where a line time is short.
 const COLUMNS: usize = 48;
-const COLUMNS_A_COLUMN: usize = 3;
+const COLUMNS_IN_A_HURRY: usize = 12;
 
 /// A search begins anew every so many pixels of one colour: where correlation converges from on a sharp
 /// texture too.
@@ -126,7 +126,7 @@ impl Tracker<'_> {
             self.watch.rest = 8;
             fit = self
                 .search(row, table, pixels)
-                .and_then(|near| self.correlate(row, table, &mut &*pixels, near).ok())
+                .and_then(|near| self.correlate(row, table, &mut &*pixels, near, None).ok())
                 .filter(|&shift| self.fits(row, pixels, shift));
         }
         self.watch.rest = self.watch.rest.saturating_sub(1);
@@ -198,7 +198,7 @@ impl Tracker<'_> {
         let line = pixels.get(overlap.line)?;
         let columns = match self.config.columns_per_line {
             u16::MAX => COLUMNS,
-            few => (COLUMNS_A_COLUMN * usize::from(few)).clamp(12, COLUMNS),
+            _ => COLUMNS_IN_A_HURRY,
         };
         // What the motion carries in and out at the ends is little known.
         let from = r.margin_px + r.stride;
@@ -212,7 +212,10 @@ impl Tracker<'_> {
         let per_count = r.noise.per_value * value;
         let (mut power, mut slopes, mut n) = (0.0f32, 0.0f32, 0u16);
         // Not at the very edge, which a reference that was moved does not know.
-        for x in (from + step / 2..to).step_by(step) {
+        let mut next = from + step / 2;
+        while next < to {
+            let x = next;
+            next += step;
             let (Some(&left), Some(&here), Some(&right), Some(&p), Some(&mask)) = (
                 mean.get(x - r.stride),
                 mean.get(x),
@@ -291,7 +294,7 @@ impl Tracker<'_> {
         for start in (0..=reach).step_by(step as usize) {
             for start in [start, -start] {
                 let start_px = middle_px + start as f32;
-                let Ok(shift_px) = self.correlate(row, table, &mut &*pixels, start_px) else {
+                let Ok(shift_px) = self.correlate(row, table, &mut &*pixels, start_px, None) else {
                     continue;
                 };
                 let Some(rest) = self.rest(row, pixels, shift_px) else {

@@ -16,8 +16,9 @@ pub const FRAMES: usize = 96;
 pub const SLOTS: usize = 96;
 /// Frequencies up to this one are sampled well, where the memory allows.
 pub const MAX_HZ: f32 = 2000.0;
-/// Columns of a row's coefficients that are built anew beside each line: spreads that work thinly.
-pub const COLUMNS_PER_LINE: u16 = 4;
+/// Columns of a row's coefficients that are built anew beside a line, when a row's are: about as long as the
+/// line's own inner product.
+pub const COLUMNS_PER_LINE: u16 = 16;
 
 /// Memory of the spectrum: one window being collected and one being computed, nine tones at once.
 pub type SpectrumMemory = StaticStorage<SAMPLES, FRAMES, SLOTS, 8192, 10>;
