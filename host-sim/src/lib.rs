@@ -14,6 +14,7 @@
 //! - [`line_scenes`]: recordings with known motion through the tracker, for the line engine's figures;
 //! - [`spectrum_scenes`]: random displacement samples with known tones, for the spectrum's figures;
 //! - [`restore`]: gaps filled, for the ear; [`methods`]: the thesis's methods and others, to compare with;
+//!   [`experiments`]: the thesis's chapter 5 again; [`figure`]: drawings for both;
 //! - [`commands`]: one file a command, each with its options and what it does;
 //! - [`failure`]: what every command says, and exits with, when it cannot go on.
 //! - [`mod@line`] follows a port that comes and goes, and [`receiver`] understands what it says; [`gateway`]:
@@ -22,7 +23,9 @@
 pub mod analysis;
 pub mod calibrate;
 pub mod commands;
+pub mod experiments;
 pub mod failure;
+pub mod figure;
 pub mod gateway;
 pub mod input;
 pub mod line;

@@ -1,105 +1,106 @@
-//! `rowtone experiments`: the tables of docs/results.md, made anew.
+//! `rowtone experiments`: the tables, figures and sounds of docs/results, made anew.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
+use crate::experiments::{Folder, Scale, chirp, far, highspeed, phone, tones, voices};
 use crate::failure::Failure;
 use crate::restore::{Method, sounds, table};
-use crate::{calibrate, methods};
 
 /// Options of `rowtone experiments`.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Example:\n  rowtone experiments --out results --only filling")]
+#[command(after_help = "\
+Writes a table (.md), figures (.svg, .png) and sounds (.wav) of each experiment. Everything takes some
+ten minutes and 2 GB of memory, --quick about one minute.
+
+Example:
+  rowtone experiments --out results --only tones --quick")]
 pub struct Args {
     /// Folder to write to; made where it does not exist
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
-    /// Only this one [default: all]
+    /// Only this one; may be given several times [default: all]
     #[arg(long, value_enum)]
-    pub only: Option<Experiment>,
-    /// Columns of the thesis's picture in the tone sweep (it had 1040; the narrower the quicker)
-    #[arg(long, value_name = "N", default_value_t = 128, value_parser = clap::value_parser!(u32).range(64..=1040))]
-    pub cols: u32,
-    /// Amplitude of the tones, px
+    pub only: Vec<Experiment>,
+    /// Narrow pictures and short sounds
+    #[arg(long)]
+    pub quick: bool,
+    /// Columns of the single tones' pictures; the thesis's camera had 1040, at four times the time
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(48..=1040))]
+    pub cols: Option<u32>,
+    /// Amplitude of the single tones, px
     #[arg(long, value_name = "A", default_value_t = 0.5)]
     pub amplitude_px: f64,
-    /// Recordings a condition in the calibration study
-    #[arg(long, value_name = "N", default_value_t = 40, value_parser = clap::value_parser!(u64).range(1..))]
-    pub seeds: u64,
+    /// A real high-speed recording (Y4M of 8 bits, motion up and down), to be measured too
+    #[arg(long, value_name = "FILE")]
+    pub real: Option<PathBuf>,
 }
 
 /// The experiments.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Experiment {
-    /// Gaps in speech and music filled, with the sounds as WAV.
+    /// Gaps in speech, music and a ramp filled, with the sounds.
     Filling,
-    /// The thesis's single tones.
+    /// Single tones in six frames.
     Tones,
-    /// Calibrations of simulated cameras.
-    Calibration,
+    /// A ramp from 100 to 1000 Hz.
+    Chirp,
+    /// Music and speech.
+    Voices,
+    /// High-speed video.
+    Highspeed,
+    /// Far shifts: shearlet against steerable pyramid.
+    Far,
+    /// A phone with 40 % blank time.
+    Phone,
 }
 
-/// Runs the experiments and writes a Markdown table each.
+/// Runs the experiments and writes what came of them.
 ///
 /// # Errors
-/// [`Failure::Usage`] for what cannot be simulated, [`Failure::Input`] where a file cannot be written.
+/// [`Failure::Usage`] for what cannot be simulated, [`Failure::Input`] where a file cannot be read or written.
 pub fn run(args: &Args) -> Result<(), Failure> {
-    let place = |path: &Path, e: &std::io::Error| Failure::writing(&path.display().to_string(), e);
-    std::fs::create_dir_all(&args.out).map_err(|e| place(&args.out, &e))?;
-    let wanted = |e: Experiment| args.only.is_none_or(|only| only == e);
-    let write = |name: &str, text: &str| {
-        let path = args.out.join(name);
-        std::fs::write(&path, text).map_err(|e| place(&path, &e))?;
-        println!("{text}");
-        Ok(())
+    let folder = Folder::new(&args.out)?;
+    let wanted = |e: Experiment| args.only.is_empty() || args.only.contains(&e);
+    let mut scale = if args.quick {
+        Scale::QUICK
+    } else {
+        Scale::USUAL
     };
-    let simulated = |e: crate::sim::SimError| Failure::usage(e.to_string());
+    scale.tone_cols = args.cols.unwrap_or(scale.tone_cols);
     if wanted(Experiment::Filling) {
-        write("filling.md", &table::markdown())?;
-        filled_sounds(&args.out)?;
+        folder.table("filling.md", &table::markdown())?;
+        filled_sounds(&folder)?;
     }
-    if wanted(Experiment::Calibration) {
-        write(
-            "calibration.md",
-            &calibrate::study::markdown(args.seeds).map_err(simulated)?,
-        )?;
+    if wanted(Experiment::Far) {
+        far::run(&folder)?;
+    }
+    if wanted(Experiment::Highspeed) {
+        highspeed::run(&folder, args.real.as_deref())?;
     }
     if wanted(Experiment::Tones) {
-        write(
-            "tones.md",
-            &methods::sweep::markdown(args.amplitude_px, args.cols).map_err(simulated)?,
-        )?;
+        tones::run(&folder, scale, args.amplitude_px)?;
+    }
+    if wanted(Experiment::Chirp) {
+        chirp::run(&folder, scale)?;
+    }
+    if wanted(Experiment::Voices) {
+        voices::run(&folder, scale)?;
+    }
+    if wanted(Experiment::Phone) {
+        phone::run(&folder, scale)?;
     }
     Ok(())
 }
 
 /// Both sounds with 30 % missing, as recovered by every method.
-fn filled_sounds(out: &Path) -> Result<(), Failure> {
+fn filled_sounds(folder: &Folder) -> Result<(), Failure> {
     for (name, sound) in [("speech", sounds::speech()), ("music", sounds::music())] {
-        wav(&out.join(format!("{name}.wav")), &sound.samples)?;
         let samples = table::with_gaps(&sound.samples, 0.3);
         for method in Method::ALL {
-            wav(
-                &out.join(format!("{name}-30-{method}.wav")),
-                &table::recover(&samples, method),
-            )?;
+            let recovered = table::recover(&samples, method);
+            let file = format!("filling-{name}-30-{method}.wav");
+            folder.wav(&file, &recovered, sounds::RATE_HZ)?;
         }
     }
     Ok(())
-}
-
-fn wav(path: &Path, samples: &[f64]) -> Result<(), Failure> {
-    let spec = hound::WavSpec {
-        channels: 1,
-        sample_rate: sounds::RATE_HZ as u32,
-        bits_per_sample: 16,
-        sample_format: hound::SampleFormat::Int,
-    };
-    let write = || -> Result<(), hound::Error> {
-        let mut writer = hound::WavWriter::create(path, spec)?;
-        for value in samples {
-            writer.write_sample((value.clamp(-1.0, 1.0) * 32_000.0) as i16)?;
-        }
-        writer.finalize()
-    };
-    write().map_err(|e| Failure::input(format!("{}: cannot be written: {e}", path.display())))
 }

@@ -14,7 +14,7 @@
 //! | [`core`] | this project's own line engine |
 //! | [`correlate`] | one-dimensional phase correlation and its sub-pixel peaks |
 //! | [`fourier`] | two-dimensional transforms |
-//! | [`study`], [`sweep`] | simulated recordings, scores, the thesis's single tones |
+//! | [`study`], [`summary`] | simulated recordings, scores, and both in short |
 
 pub mod bank;
 pub mod classical;
@@ -24,7 +24,7 @@ pub mod fourier;
 pub mod shearlet;
 pub mod steerable;
 pub mod study;
-pub mod sweep;
+pub mod summary;
 pub mod thesis;
 pub mod visual;
 

@@ -64,7 +64,7 @@ pub fn record(config: Config) -> Result<Recording, SimError> {
 pub struct Score {
     /// The method.
     pub method: &'static str,
-    /// Noise of a row (robust) over the bound of a row (median); 1 is the best possible.
+    /// Noise of the rows, each over its own bound (robust); 1 is the best possible.
     pub noise_over_bound: f64,
     /// Amplitude found over true amplitude, less 1.
     pub amplitude_error: f64,
@@ -90,17 +90,14 @@ pub fn score(method: &dyn Method, recording: &Recording, hz: f64) -> Score {
     let [tc, ts] = fit.amplitude(&truth, hz);
     let (found, true_amplitude) = (c.hypot(s), tc.hypot(ts));
     let gain = found / true_amplitude;
+    // The row's own mean took one of its values' freedom.
+    let freedom = (1.0 - 1.0 / recording.clip.frames.len().max(2) as f64).sqrt();
     let errors: Vec<f64> = each(&fit.known)
-        .map(|(n, y)| (shifts[n][y] - gain * truth[n][y]).abs())
+        .filter_map(|(n, y)| {
+            Some((shifts[n][y] - gain * truth[n][y]).abs() / recording.bounds_px[y]?)
+        })
         .collect();
-    let noise = 1.4826 * median(&errors) / gain.clamp(0.05, 20.0);
-    let bound = median(
-        &recording
-            .bounds_px
-            .iter()
-            .filter_map(|b| *b)
-            .collect::<Vec<_>>(),
-    );
+    let noise = 1.4826 * median(&errors) / gain.clamp(0.05, 20.0) / freedom;
     let left: Shifts = fit.without(&shifts, hz, [c, s]);
     let ghost = [-3.0, -2.0, -1.0, 1.0, 2.0, 3.0]
         .iter()
@@ -113,7 +110,7 @@ pub fn score(method: &dyn Method, recording: &Recording, hz: f64) -> Score {
         .fold(0.0, f64::max);
     Score {
         method: method.name(),
-        noise_over_bound: noise / bound,
+        noise_over_bound: noise,
         amplitude_error: gain - 1.0,
         hz_error: fit.frequency(&shifts, hz, 5.0).map(|f| f - hz),
         ghost,
@@ -192,7 +189,7 @@ impl<'a> Fit<'a> {
     }
 
     /// What is left without a tone.
-    fn without(&self, shifts: &Shifts, hz: f64, [c, s]: [f64; 2]) -> Shifts {
+    pub fn without(&self, shifts: &Shifts, hz: f64, [c, s]: [f64; 2]) -> Shifts {
         let waves = self.regressors(hz);
         (0..shifts.len())
             .map(|n| {
@@ -201,6 +198,20 @@ impl<'a> Fit<'a> {
                     .collect()
             })
             .collect()
+    }
+
+    /// The frequency in a band, Hz, that explains most; `None` where that lies at the band's edge.
+    pub fn strongest(&self, shifts: &Shifts, (low, high): (f64, f64)) -> Option<f64> {
+        let times = self.recording.times_s.iter().flatten();
+        let end = times.copied().fold(0.0, f64::max);
+        // A quarter of what the length of the recording tells apart.
+        let step = 0.25 / end.max(1e-3);
+        let count = ((high - low) / step) as usize;
+        let best = (0..=count)
+            .map(|k| low + step * k as f64)
+            .map(|hz| (hz, self.projection(shifts, hz).1))
+            .max_by(|a, b| a.1.total_cmp(&b.1))?;
+        self.frequency(shifts, best.0, 2.0 * step)
     }
 
     /// The frequency within `reach` of `hz` that explains most; `None` where that lies at the edge.

@@ -1,8 +1,8 @@
-//! The Visual Microphone (Davis et al. 2014) on the complex steerable pyramid: phase against the first frame, weighted
-//! by squared amplitude, sub-bands aligned and summed.
+//! The Visual Microphone (Davis et al. 2014) on the complex steerable pyramid: phase against the first frame, summed
+//! with the squared amplitude as weight, sub-bands aligned and summed.
 //!
-//! The original sums phases in radians, whose scale depends on the texture and differs from row to row; here each
-//! mean phase is divided by the equally weighted slope of the first frame's phase across, so that the result is in px.
+//! The original's sum has no unit, and its scale differs from row to row with the texture; here it is divided by what a
+//! pixel of motion adds to it (the first frame's slope of the phase across, with the same weights).
 
 use super::fourier::C;
 use super::steerable::{ORIENTATIONS, Pyramid, SCALES};
@@ -48,11 +48,26 @@ impl Method for VisualMicrophone {
             By::Frame => clip.width * clip.height,
         };
         // Bands that look down are left out: what moves sideways does not show there.
-        let signals = (0..pyramid.bands.len())
+        let bands: Vec<usize> = (0..pyramid.bands.len())
             .filter(|&band| pyramid.bands[band].angle == 0.0)
-            .map(|band| phases(&pyramid, &spectra, band, length))
             .collect();
-        let shifts = align_and_sum(signals);
+        let mut shifts = align_and_sum(
+            bands
+                .iter()
+                .map(|&band| phases(&pyramid, &spectra, band, length))
+                .collect(),
+        );
+        // The sum is an average over the sub-bands; so is what a pixel would make of it.
+        let mut turn = vec![f64::MIN_POSITIVE; clip.width * clip.height / length.max(1)];
+        for &band in &bands {
+            let of_band = turns(&pyramid, &spectra[0], band, length);
+            turn.iter_mut()
+                .zip(of_band)
+                .for_each(|(t, b)| *t += b / bands.len() as f64);
+        }
+        for frame in &mut shifts {
+            frame.iter_mut().zip(&turn).for_each(|(v, t)| *v /= t);
+        }
         match self.by {
             By::Row => shifts,
             By::Frame => shifts.iter().map(|f| vec![f[0]; clip.height]).collect(),
@@ -60,47 +75,38 @@ impl Method for VisualMicrophone {
     }
 }
 
-/// Mean phase against the first frame of every `length` coefficients, weighted by squared amplitude, in px.
+/// Sum of the phase against the first frame, weighted by squared amplitude, of every `length` coefficients.
 fn phases(pyramid: &Pyramid, spectra: &[Vec<C>], band: usize, length: usize) -> Shifts {
-    let bank = &pyramid.bank;
-    let reference = bank.band(&spectra[0], band);
-    // Slope of the phase across, weighted in the same way: what a pixel of motion turns the mean phase by.
-    let sloped: Vec<C> = (0..spectra[0].len())
-        .map(|bin| C::i() * bank.plane().frequency(bin).0 * spectra[0][bin])
-        .collect();
-    let slopes: Vec<f64> = bank
-        .band(&sloped, band)
-        .chunks_exact(length)
-        .zip(reference.chunks_exact(length))
-        .map(|(slope, c)| {
-            let turn: f64 = slope.iter().zip(c).map(|(s, c)| (s * c.conj()).im).sum();
-            turn / c
-                .iter()
-                .map(|c| c.norm_sqr())
-                .sum::<f64>()
-                .max(f64::MIN_POSITIVE)
-        })
-        .collect();
-    let against = |here: &[C], reference: &[C], slope: f64| {
-        let (mut sum, mut weight) = (0.0, f64::MIN_POSITIVE);
-        for (c, r) in here.iter().zip(reference) {
-            let amplitude = c.norm_sqr();
-            sum += amplitude * (c * r.conj()).arg();
-            weight += amplitude;
-        }
-        // A shift to the right turns phases back.
-        -sum / weight / slope.max(1e-3)
+    let reference = pyramid.bank.band(&spectra[0], band);
+    let against = |here: &[C], reference: &[C]| -> f64 {
+        let pairs = here.iter().zip(reference);
+        pairs
+            .map(|(c, r)| c.norm_sqr() * (c * r.conj()).arg())
+            .sum()
     };
     spectra
         .iter()
         .map(|spectrum| {
-            bank.band(spectrum, band)
+            let here = pyramid.bank.band(spectrum, band);
+            let rows = here
                 .chunks_exact(length)
-                .zip(reference.chunks_exact(length))
-                .zip(&slopes)
-                .map(|((here, reference), slope)| against(here, reference, *slope))
+                .zip(reference.chunks_exact(length));
+            // A shift to the right turns phases back.
+            rows.map(|(here, reference)| -against(here, reference))
                 .collect()
         })
+        .collect()
+}
+
+/// What a pixel of motion adds to that sum: the equally weighted slope of the phase across.
+fn turns(pyramid: &Pyramid, spectrum: &[C], band: usize, length: usize) -> Vec<f64> {
+    let bank = &pyramid.bank;
+    let sloped: Vec<C> = (0..spectrum.len())
+        .map(|bin| C::i() * bank.plane().frequency(bin).0 * spectrum[bin])
+        .collect();
+    let (here, slope) = (bank.band(spectrum, band), bank.band(&sloped, band));
+    let rows = here.chunks_exact(length).zip(slope.chunks_exact(length));
+    rows.map(|(c, s)| s.iter().zip(c).map(|(s, c)| (s * c.conj()).im).sum())
         .collect()
 }
 

@@ -7,15 +7,29 @@
 use super::simple;
 use crate::linear::dot;
 
-/// Samples in a block.
-const BLOCK: usize = 4096;
-/// Turns.
-const TURNS: usize = 6;
-/// Highest order of the model.
-const HIGHEST_ORDER: usize = 96;
+/// How the model is made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Model {
+    /// Samples in a block.
+    pub block: usize,
+    /// Turns.
+    pub turns: usize,
+    /// Order of the model: three times the longest gap, but at least and at most this.
+    pub orders: [usize; 2],
+}
+
+impl Default for Model {
+    fn default() -> Self {
+        Self {
+            block: 4096,
+            turns: 6,
+            orders: [2, 96],
+        }
+    }
+}
 
 /// Fills the missing samples.
-pub fn fill(samples: &[Option<f64>]) -> Vec<f64> {
+pub fn fill(samples: &[Option<f64>], model: Model) -> Vec<f64> {
     let mut filled = simple::linear(samples);
     let longest = simple::gaps(samples)
         .iter()
@@ -27,11 +41,11 @@ pub fn fill(samples: &[Option<f64>]) -> Vec<f64> {
     }
     let mut start = 0;
     while start < samples.len() {
-        let end = (start + BLOCK).min(samples.len());
+        let end = (start + model.block).min(samples.len());
         let known: Vec<bool> = samples[start..end].iter().map(Option::is_some).collect();
         // Half a block of context on the left is done already.
-        let block = fill_block(&filled[start..end], &known, longest);
-        let from = if start == 0 { 0 } else { BLOCK / 4 };
+        let block = fill_block(&filled[start..end], &known, longest, model);
+        let from = if start == 0 { 0 } else { model.block / 4 };
         if let Some(block) = block {
             filled[start + from.min(end - start)..end]
                 .copy_from_slice(&block[from.min(end - start)..]);
@@ -39,15 +53,17 @@ pub fn fill(samples: &[Option<f64>]) -> Vec<f64> {
         if end == samples.len() {
             break;
         }
-        start += BLOCK / 2;
+        start += model.block / 2;
     }
     filled
 }
 
 /// One block, from a first guess. `None` where there is too little to go by.
-fn fill_block(guess: &[f64], known: &[bool], longest: usize) -> Option<Vec<f64>> {
+fn fill_block(guess: &[f64], known: &[bool], longest: usize, how: Model) -> Option<Vec<f64>> {
     let missing: Vec<usize> = (0..guess.len()).filter(|&i| !known[i]).collect();
-    let order = (3 * longest + 2).min(HIGHEST_ORDER).min(guess.len() / 4);
+    let order = (3 * longest + 2)
+        .clamp(how.orders[0], how.orders[1])
+        .min(guess.len() / 4);
     if missing.is_empty() || order < 2 || guess.len() - missing.len() < 2 * order {
         return None;
     }
@@ -58,7 +74,7 @@ fn fill_block(guess: &[f64], known: &[bool], longest: usize) -> Option<Vec<f64>>
         .sum::<f64>()
         / known_count;
     let mut signal: Vec<f64> = guess.iter().map(|v| v - mean).collect();
-    for _ in 0..TURNS {
+    for _ in 0..how.turns {
         let model = levinson(&autocorrelation(&signal, order))?;
         // b(l) = Σ a(k) a(k + l): what the energy of the model's error makes of two samples l apart.
         let couple: Vec<f64> = (0..=order)

@@ -13,6 +13,7 @@
 //! | [`butterworth`] | the low-pass that follows |
 //! | [`long`] | both on a signal of any length, as `displacement --format wav` does |
 //! | [`agreement`] | gain, delay and signal-to-noise ratio against the truth |
+//! | [`stft`] | power over time and frequency |
 //! | [`sounds`], [`table`] | speech and music, and how well each method recovers them |
 
 use std::fmt;
@@ -24,6 +25,7 @@ pub mod butterworth;
 pub mod long;
 pub mod simple;
 pub mod sounds;
+pub mod stft;
 pub mod table;
 pub mod tones;
 
@@ -101,7 +103,7 @@ pub fn fill(samples: &[Option<f64>], method: Method) -> Vec<f64> {
                 .zip(&base)
                 .map(|(s, b)| s.map(|s| s - b))
                 .collect();
-            let filled = ar::fill(&rest);
+            let filled = ar::fill(&rest, ar::Model::default());
             pass_through(samples, |i| base[i] + filled[i])
         }
         Method::JointTones => {

@@ -149,13 +149,22 @@ impl Picture {
             one_a_frame: self.settings.one_a_frame,
         })
         .map_err(|error| failed(&error))?;
-        let bytes = match ending(path) {
-            Some(Ending::Png) => png(&svg).map_err(|error| failed(&error))?,
-            _ => svg.into_bytes(),
-        };
-        std::fs::write(path, bytes)
-            .map_err(|error| Failure::writing(&path.display().to_string(), &error))
+        write(path, svg)
     }
+}
+
+/// Writes a drawing, as what the file's ending says.
+///
+/// # Errors
+/// [`Failure::Input`] when it cannot be drawn or written.
+pub fn write(path: &Path, svg: String) -> Result<(), Failure> {
+    let name = path.display();
+    let bytes = match ending(path) {
+        Some(Ending::Png) => png(&svg)
+            .map_err(|error| Failure::input(format!("{name}: cannot be drawn: {error}")))?,
+        _ => svg.into_bytes(),
+    };
+    std::fs::write(path, bytes).map_err(|error| Failure::writing(&name.to_string(), &error))
 }
 
 /// Whether a picture of this name can be drawn.
