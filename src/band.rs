@@ -28,7 +28,7 @@ pub enum Level {
 pub const MAX_HALF: usize = 5;
 
 /// The central difference of tenth order, right half.
-pub(crate) const DERIVATIVE: [f32; 5] = [
+const DERIVATIVE: [f32; 5] = [
     5.0 / 6.0,
     -5.0 / 21.0,
     5.0 / 84.0,
@@ -36,13 +36,14 @@ pub(crate) const DERIVATIVE: [f32; 5] = [
     1.0 / 1260.0,
 ];
 
-/// Lagrange's interpolation half-way between ten points, right half.
-pub(crate) const HALFWAY: [f32; 5] = [
-    39690.0 / 65536.0,
-    -8820.0 / 65536.0,
-    2268.0 / 65536.0,
-    -405.0 / 65536.0,
-    35.0 / 65536.0,
+/// Slope and value half-way of a row's phase-correlation function, from its values at whole shifts: right halves. Largest
+/// error up to 0.3 cycles/px as small as six can make it, 0.02 % (minimax, the lowest frequencies exact): what is
+/// missing of the slope would be missing of the scale of every shift. Differences of tenth order lose 4 % there.
+pub(crate) const SLOPE: [f32; 6] = [
+    0.914_754, -0.348_036, 0.143_975, -0.052_355, 0.014_455, -0.002_243,
+];
+pub(crate) const HALFWAY: [f32; 6] = [
+    0.622_101, -0.171_956, 0.069_952, -0.026_704, 0.008_104, -0.001_497,
 ];
 
 impl Level {

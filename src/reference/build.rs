@@ -5,7 +5,8 @@
 
 use super::{CUBICS, OFFSETS_PER_PX, QUADRATICS, RowTable};
 use crate::{
-    band::{DERIVATIVE, HALFWAY, Level, MAX_HALF},
+    align::UNKNOWN_STEPS,
+    band::{HALFWAY, Level, MAX_HALF, SLOPE},
     kernel::{Kernel, MAX_COEFFICIENT},
     noise::PixelNoise,
 };
@@ -40,7 +41,7 @@ const ENERGY_COLUMNS: usize = 2 * ENERGY_REACH + 1;
 const RING: usize = ENERGY_COLUMNS.next_power_of_two();
 
 /// Whole shifts either way at which the phase-correlation function is taken.
-const LAGS: usize = DERIVATIVE.len();
+const LAGS: usize = SLOPE.len();
 
 /// A column of a correlation is so many times less work than one of another step.
 const CORRELATED: usize = 4;
@@ -248,7 +249,8 @@ impl Build {
     /// is saturated.
     fn weigh(&mut self, span: Range<usize>, mean: &[u16], mask: &[u8], w: &mut [f32]) {
         let r = self.recipe;
-        let reach = r.level.half_filter().len() * r.stride;
+        // What came in from beyond the ends was not averaged: there the first frame's noise still stands.
+        let reach = (r.level.half_filter().len() + UNKNOWN_STEPS) * r.stride;
         let edge = r.margin_px + MAX_HALF * r.stride;
         for x in span {
             let (Some(w), Some(&count)) = (w.get_mut(x), mean.get(x)) else {
@@ -450,7 +452,7 @@ impl Build {
         let q = &self.q;
         let stride = self.recipe.stride as f32;
         let slope: f32 = (1..)
-            .zip(DERIVATIVE)
+            .zip(SLOPE)
             .map(|(k, f)| f * (q[LAGS + k] - q[LAGS - k]))
             .sum::<f32>()
             / stride;
