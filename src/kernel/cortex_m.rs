@@ -2,115 +2,127 @@
 //!
 //! Four pixels and four coefficients are a word each. `uxtb16` and `sxtb16` spread the even and the odd
 //! bytes of a word over two half-words, `smlad` multiplies and adds two pairs, `usada8` adds four pixels:
-//! seven instructions for four pixels. Loads come on top: one for two words where both rows lie at whole
-//! words, else one a word. 256 pixels take 520 and 584 instructions.
+//! seven instructions for four pixels. Loads come on top: three for sixteen pixels where both rows lie at whole
+//! words, else eight. `boards/mps2-an505/kernel.sh` compares the bits and counts.
+//!
+//! The functions are written as a whole, with all registers that there are: a compiler keeps two of them to itself.
 
 use super::Sums;
-use core::arch::asm;
+use core::arch::naked_asm;
 
 /// Pixels a block: its sums fit 32 bits, 64·255·2¹⁶ < 2³¹.
 const BLOCK: usize = 1 << 16;
 
-/// Pixels a turn of the long loop.
-const TURN: usize = 64;
-
 #[inline(always)]
 pub(super) fn sums_u8(pixels: &[u8], coefficients: &[i8]) -> Sums {
+    let n = pixels.len().min(coefficients.len());
+    let (p, h) = (pixels.as_ptr(), coefficients.as_ptr());
+    if (p as usize | h as usize | n) % 4 != 0 || n > BLOCK {
+        return general(pixels, coefficients);
+    }
+    // SAFETY: both pointers lie at whole words and are good for n bytes, a multiple of four.
+    sums(unsafe { aligned(p, h, n) })
+}
+
+/// Of any length, beginning anywhere.
+#[inline(never)]
+fn general(pixels: &[u8], coefficients: &[i8]) -> Sums {
     let n = pixels.len().min(coefficients.len());
     if n > BLOCK {
         return long(pixels, coefficients);
     }
-    let (mut product, mut plain) = words(pixels.as_ptr(), coefficients.as_ptr(), n);
-    if n % 4 != 0 {
-        (product, plain) = rest(product, plain, pixels, coefficients);
+    let whole = n & !3;
+    // SAFETY: both pointers are good for `whole` bytes, a multiple of four.
+    let mut all = sums(unsafe { anywhere(pixels.as_ptr(), coefficients.as_ptr(), whole) });
+    if whole < n
+        && let (Some(p), Some(h)) = (pixels.get(whole..n), coefficients.get(whole..n))
+    {
+        for (&p, &h) in p.iter().zip(h) {
+            all.product += i64::from(i32::from(p) * i32::from(h));
+            all.pixels += u64::from(p);
+        }
     }
-    Sums {
-        product: i64::from(product),
-        pixels: u64::from(plain),
-    }
+    all
 }
 
 /// Longer than any line: block by block.
 #[cold]
 fn long(pixels: &[u8], coefficients: &[i8]) -> Sums {
-    let mut sums = Sums::default();
+    let mut all = Sums::default();
     for (p, h) in pixels.chunks(BLOCK).zip(coefficients.chunks(BLOCK)) {
         let block = sums_u8(p, h);
-        sums.product += block.product;
-        sums.pixels += block.pixels;
+        all.product += block.product;
+        all.pixels += block.pixels;
     }
-    sums
+    all
 }
 
-/// Adds the pixels beyond the last whole word.
-#[cold]
-fn rest(product: i32, plain: u32, pixels: &[u8], coefficients: &[i8]) -> (i32, u32) {
-    let n = pixels.len().min(coefficients.len());
-    let rest = n - n % 4..n;
-    let (Some(p), Some(h)) = (pixels.get(rest.clone()), coefficients.get(rest)) else {
-        return (product, plain);
-    };
-    let pairs = p.iter().zip(h);
-    pairs.fold((product, plain), |(product, plain), (&p, &h)| {
-        (
-            product.wrapping_add(i32::from(p) * i32::from(h)),
-            plain.wrapping_add(u32::from(p)),
-        )
-    })
+/// From what `aligned` and `anywhere` return: Σ h·p below, Σ p above.
+#[inline(always)]
+fn sums(both: u64) -> Sums {
+    Sums {
+        product: i64::from(both as i32),
+        pixels: both >> 32,
+    }
 }
 
-/// Four pixels in `$a` and their coefficients in `$b`, both lost.
+/// Four pixels in `$p` and their coefficients in `$h`, both lost. Σ h·p is in r3, Σ p in r4, 0 in r5; r6 and r7 are
+/// lost.
 macro_rules! quad {
-    ($a:literal, $b:literal) => {
+    ($p:literal, $h:literal) => {
         concat!(
-            "usada8 {plain}, {",
-            $a,
-            "}, {zero}, {plain}\n",
-            "uxtb16 {t}, {",
-            $a,
-            "}\n",
-            "sxtb16 {u}, {",
-            $b,
-            "}\n",
-            "smlad {product}, {t}, {u}, {product}\n",
-            "uxtb16 {",
-            $a,
-            "}, {",
-            $a,
-            "}, ror #8\n",
-            "sxtb16 {",
-            $b,
-            "}, {",
-            $b,
-            "}, ror #8\n",
-            "smlad {product}, {",
-            $a,
-            "}, {",
-            $b,
-            "}, {product}\n",
+            "usada8 r4, ",
+            $p,
+            ", r5, r4\n",
+            "uxtb16 r6, ",
+            $p,
+            "\n",
+            "sxtb16 r7, ",
+            $h,
+            "\n",
+            "smlad r3, r6, r7, r3\n",
+            "uxtb16 ",
+            $p,
+            ", ",
+            $p,
+            ", ror #8\n",
+            "sxtb16 ",
+            $h,
+            ", ",
+            $h,
+            ", ror #8\n",
+            "smlad r3, ",
+            $p,
+            ", ",
+            $h,
+            ", r3\n",
         )
     };
 }
 
-/// Eight pixels of rows that lie at whole words.
-macro_rules! aligned {
+/// Sixteen pixels of rows that lie at whole words.
+macro_rules! sixteen {
     () => {
         concat!(
-            "ldrd {a}, {c}, [{p}], #8\n",
-            "ldrd {b}, {d}, [{h}], #8\n",
-            quad!("a", "b"),
-            quad!("c", "d"),
+            "ldmia r0!, {{r8-r11}}\n",
+            "ldrd r12, lr, [r1], #8\n",
+            quad!("r8", "r12"),
+            quad!("r9", "lr"),
+            "ldrd r12, lr, [r1], #8\n",
+            quad!("r10", "r12"),
+            quad!("r11", "lr"),
         )
     };
 }
 
-/// Four pixels that may lie anywhere.
-macro_rules! anywhere {
+/// Four pixels that may lie anywhere: a single word's load needs no alignment on these cores (ARMv7-M and ARMv8-M with
+/// UNALIGN_TRP clear, as after reset).
+macro_rules! four {
     () => {
         concat!(
-            "ldr {a}, [{p}], #4\n",
-            "ldr {b}, [{h}], #4\n",
-            quad!("a", "b"),
+            "ldr r8, [r0], #4\n",
+            "ldr r12, [r1], #4\n",
+            quad!("r8", "r12"),
         )
     };
 }
@@ -122,85 +134,52 @@ macro_rules! times {
     (8, $x:expr) => {
         concat!(times!(4, $x), times!(4, $x))
     };
-    (16, $x:expr) => {
-        concat!(times!(8, $x), times!(8, $x))
+}
+
+/// Σ h·p and Σ p of the r2 pixels at r0 and coefficients at r1, `$turn` of them a turn and what is left in fours.
+macro_rules! whole_function {
+    ($turn:literal, $pixels:expr) => {
+        naked_asm!(
+            ".cpu cortex-m33",
+            "push {{r4-r11, lr}}",
+            "movs r3, #0",
+            "movs r4, #0",
+            "movs r5, #0",
+            concat!("subs r2, #", $turn),
+            "blo 3f",
+            "2:",
+            $pixels,
+            concat!("subs r2, #", $turn),
+            "bhs 2b",
+            "3:",
+            concat!("adds r2, #", $turn),
+            "beq 5f",
+            "4:",
+            four!(),
+            "subs r2, #4",
+            "bne 4b",
+            "5:",
+            "mov r0, r3",
+            "mov r1, r4",
+            "pop {{r4-r11, pc}}",
+        )
     };
 }
 
-/// The sums over all whole words of the `n` ≤ [`BLOCK`] pixels and coefficients that both pointers must be
-/// good for. A call costs less than a second copy in flash.
-#[inline(never)]
-fn words(mut p: *const u8, mut h: *const i8, n: usize) -> (i32, u32) {
-    let (mut product, mut plain) = (0i32, 0u32);
-    let turns = n / TURN;
-    if turns > 0 {
-        // SAFETY: either loop reads `turns` times 64 bytes from either pointer, and both are good
-        // for so many. `ldrd` needs whole words, which is asked for; single-word loads need no alignment on
-        // these cores (ARMv7-M and ARMv8-M with UNALIGN_TRP clear, as after reset). Nothing is written.
-        unsafe {
-            if (p as usize | h as usize) % 4 == 0 {
-                asm!(
-                    "2:",
-                    times!(8, aligned!()),
-                    "subs {n}, #1",
-                    "bne 2b",
-                    p = inout(reg) p,
-                    h = inout(reg) h,
-                    n = inout(reg) turns => _,
-                    product = inout(reg) product,
-                    plain = inout(reg) plain,
-                    zero = in(reg) 0,
-                    a = out(reg) _,
-                    b = out(reg) _,
-                    c = out(reg) _,
-                    d = out(reg) _,
-                    t = out(reg) _,
-                    u = out(reg) _,
-                    options(nostack, readonly),
-                );
-            } else {
-                asm!(
-                    "2:",
-                    times!(16, anywhere!()),
-                    "subs {n}, #1",
-                    "bne 2b",
-                    p = inout(reg) p,
-                    h = inout(reg) h,
-                    n = inout(reg) turns => _,
-                    product = inout(reg) product,
-                    plain = inout(reg) plain,
-                    zero = in(reg) 0,
-                    a = out(reg) _,
-                    b = out(reg) _,
-                    t = out(reg) _,
-                    u = out(reg) _,
-                    options(nostack, readonly),
-                );
-            }
-        }
-    }
-    let left = n % TURN / 4;
-    if left > 0 {
-        // SAFETY: as above; `turns`·64 + `left`·4 ≤ n bytes are read in all.
-        unsafe {
-            asm!(
-                "2:",
-                anywhere!(),
-                "subs {n}, #1",
-                "bne 2b",
-                p = inout(reg) p => _,
-                h = inout(reg) h => _,
-                n = inout(reg) left => _,
-                product = inout(reg) product,
-                plain = inout(reg) plain,
-                zero = in(reg) 0,
-                a = out(reg) _,
-                b = out(reg) _,
-                t = out(reg) _,
-                u = out(reg) _,
-                options(nostack, readonly),
-            );
-        }
-    }
-    (product, plain)
+/// Rows that lie at whole words.
+///
+/// # Safety
+/// Both pointers must lie at a multiple of four and be good for `n` bytes, a multiple of four, at most [`BLOCK`].
+#[unsafe(naked)]
+unsafe extern "C" fn aligned(p: *const u8, h: *const i8, n: usize) -> u64 {
+    whole_function!("64", times!(4, sixteen!()))
+}
+
+/// Rows that lie anywhere.
+///
+/// # Safety
+/// Both pointers must be good for `n` bytes, a multiple of four, at most [`BLOCK`].
+#[unsafe(naked)]
+unsafe extern "C" fn anywhere(p: *const u8, h: *const i8, n: usize) -> u64 {
+    whole_function!("32", times!(8, four!()))
 }

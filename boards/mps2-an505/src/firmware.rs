@@ -1,10 +1,5 @@
 //! Clip in, reports out, figures at the end.
 
-use crate::board::{
-    counter::{Counter, Start},
-    host, stack,
-    uart::Uart,
-};
 use crate::lines::{ClipError, Lines, MAX_WIDTH, Pixels8};
 use core::fmt::{self, Write};
 use cortex_m_rt::entry;
@@ -16,6 +11,11 @@ use rowtone::timeline::{Binner, BinnerError, Group, Sample};
 use rowtone::tracker::{self, Tracker};
 use rowtone::wire::{Message, text};
 use rowtone_mps2_an505::args::Args;
+use rowtone_mps2_an505::board::{
+    counter::{Counter, Start},
+    host, stack,
+    uart::Uart,
+};
 use rowtone_mps2_an505::figures::Count;
 use rowtone_pico2::memory::{SpectrumMemory, TrackerMemory, rows_per_sample};
 use static_cell::{ConstStaticCell, StaticCell};
@@ -206,9 +206,3 @@ failure_from!(
     Clip: ClipError, Timing: TimingError, Group: BinnerError,
     Tracker: tracker::ConfigError, Spectrum: spectrum::ConfigError
 );
-
-#[panic_handler]
-fn panic(info: &core::panic::PanicInfo) -> ! {
-    let _ = writeln!(Uart::new(), "{info}");
-    host::exit(false)
-}

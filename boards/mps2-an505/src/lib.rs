@@ -1,6 +1,8 @@
-//! What the firmware for QEMU's Cortex-M33 board is made of, as far as a host can test it.
+//! What the programs for QEMU's Cortex-M33 board are made of: what a host can test, and the board itself.
 #![cfg_attr(not(test), no_std)]
 
 pub mod args;
+#[cfg(target_os = "none")]
+pub mod board;
 pub mod figures;
 pub mod y4m;

@@ -1,7 +1,7 @@
 //! The clip as a camera would deliver it: line after line, each with its time.
 
-use crate::board::host::{File, FileError};
 use rowtone::camera::{Line, Pixels, Timing};
+use rowtone_mps2_an505::board::host::{File, FileError};
 use rowtone_mps2_an505::y4m::{Clip, MAX_HEADER, Y4mError};
 
 /// Longest line that is read, px: the budget's picture is 320 x 240.

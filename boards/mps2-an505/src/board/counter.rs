@@ -18,13 +18,13 @@ fn SysTick() {
 }
 
 /// Counts the instructions between two points.
-pub(crate) struct Counter {
+pub struct Counter {
     overhead_ticks: u64,
 }
 
 impl Counter {
     /// Start SysTick, and measure what measuring costs.
-    pub(crate) fn new(mut syst: SYST) -> Self {
+    pub fn new(mut syst: SYST) -> Self {
         syst.set_clock_source(SystClkSource::Core);
         syst.set_reload(RELOAD);
         syst.clear_current();
@@ -41,19 +41,19 @@ impl Counter {
     }
 
     /// The point from which on instructions count.
-    pub(crate) fn start(&self) -> Start {
+    pub fn start(&self) -> Start {
         Start(ticks())
     }
 
     /// Instructions since `start`.
-    pub(crate) fn instructions(&self, start: Start) -> u64 {
+    pub fn instructions(&self, start: Start) -> u64 {
         (ticks() - start.0).saturating_sub(self.overhead_ticks) * 100 / TICKS_100
     }
 }
 
 /// A point in time, from [`Counter::start`].
 #[derive(Clone, Copy)]
-pub(crate) struct Start(u64);
+pub struct Start(u64);
 
 #[inline(never)]
 fn ticks() -> u64 {

@@ -4,7 +4,7 @@ use core::fmt;
 use cortex_m_semihosting::{debug, nr, syscall, syscall1};
 
 /// The command line that QEMU was given (`arg=` words, a space between them).
-pub(crate) fn command_line(buffer: &mut [u8]) -> Option<&str> {
+pub fn command_line(buffer: &mut [u8]) -> Option<&str> {
     let mut block = [buffer.as_mut_ptr() as usize, buffer.len()];
     // SAFETY: the block is a buffer and its length; the host writes at most that much, and the true length.
     let failed = unsafe { syscall1(nr::GET_CMDLINE, &raw mut block as usize) };
@@ -13,7 +13,7 @@ pub(crate) fn command_line(buffer: &mut [u8]) -> Option<&str> {
 }
 
 /// End QEMU with exit status 0 or 1.
-pub(crate) fn exit(success: bool) -> ! {
+pub fn exit(success: bool) -> ! {
     let status = if success {
         debug::EXIT_SUCCESS
     } else {
@@ -25,14 +25,14 @@ pub(crate) fn exit(success: bool) -> ! {
 }
 
 /// A file of the host, open for reading.
-pub(crate) struct File {
+pub struct File {
     handle: usize,
     bytes: usize,
 }
 
 /// A file that cannot be read.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum FileError {
+pub enum FileError {
     /// It cannot be opened.
     Open,
     /// It ends early, or the host refuses.
@@ -50,7 +50,7 @@ impl fmt::Display for FileError {
 
 impl File {
     /// Open for reading, in binary. The path is at most 511 bytes long.
-    pub(crate) fn open(path: &str) -> Result<Self, FileError> {
+    pub fn open(path: &str) -> Result<Self, FileError> {
         let mut name = [0u8; 512]; // the host wants a final zero
         name.get_mut(..path.len())
             .filter(|p| p.len() < 512)
@@ -67,12 +67,12 @@ impl File {
     }
 
     /// Bytes in the file.
-    pub(crate) fn len(&self) -> usize {
+    pub fn len(&self) -> usize {
         self.bytes
     }
 
     /// The next read starts here.
-    pub(crate) fn seek(&mut self, byte: usize) -> Result<(), FileError> {
+    pub fn seek(&mut self, byte: usize) -> Result<(), FileError> {
         // SAFETY: the block is an open handle and a position.
         match unsafe { syscall(nr::SEEK, &[self.handle, byte]) } {
             0 => Ok(()),
@@ -81,7 +81,7 @@ impl File {
     }
 
     /// Read as much as there is; returns the bytes that were read.
-    pub(crate) fn read(&mut self, buffer: &mut [u8]) -> Result<usize, FileError> {
+    pub fn read(&mut self, buffer: &mut [u8]) -> Result<usize, FileError> {
         // SAFETY: the block is an open handle, a buffer and its length; the host writes at most that much.
         let left = unsafe {
             syscall(
@@ -93,7 +93,7 @@ impl File {
     }
 
     /// Fill the buffer, or fail.
-    pub(crate) fn read_exact(&mut self, buffer: &mut [u8]) -> Result<(), FileError> {
+    pub fn read_exact(&mut self, buffer: &mut [u8]) -> Result<(), FileError> {
         match self.read(buffer)? {
             n if n == buffer.len() => Ok(()),
             _ => Err(FileError::Read),

@@ -12,7 +12,7 @@ unsafe extern "C" {
 }
 
 /// Most bytes of stack in use since reset.
-pub(crate) fn used_max_bytes() -> usize {
+pub fn used_max_bytes() -> usize {
     let (mut p, top) = (&raw const _stack_end, &raw const _stack_start);
     // SAFETY: from the end of the static data to the top of the RAM everything is painted words.
     while p < top && unsafe { p.read_volatile() } == STACK_PAINT_VALUE {
@@ -22,11 +22,11 @@ pub(crate) fn used_max_bytes() -> usize {
 }
 
 /// Bytes of static RAM: everything below the stack.
-pub(crate) fn static_ram_bytes() -> usize {
+pub fn static_ram_bytes() -> usize {
     (&raw const __ebss) as usize - (&raw const __sdata) as usize
 }
 
 /// Bytes of flash: code, constants and the initial values of static data.
-pub(crate) fn flash_bytes() -> usize {
+pub fn flash_bytes() -> usize {
     (&raw const __flash_end) as usize - (&raw const __vector_table_start) as usize
 }
