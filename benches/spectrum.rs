@@ -42,6 +42,7 @@ impl Window {
                 };
                 let moved: f64 = (0..tones).map(tone).sum();
                 samples.push(Sample {
+                    curvature: Default::default(),
                     frame,
                     slot,
                     time_ns,

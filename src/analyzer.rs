@@ -37,7 +37,7 @@ use crate::timeline::{Group, Sample};
 ///         let shift_px = 0.1 * (time_ns as f64 * 1e-9 * 133.0 * std::f64::consts::TAU).cos()
 ///             + 0.01 * (f64::from(noise) / 4.3e9 - 0.5);
 ///         let sample = Sample {
-///             frame, slot, time_ns, shift_px: shift_px as f32, information_per_px2: 1e5, spread: group.even_spread(),
+///             frame, slot, curvature: Default::default(), time_ns, shift_px: shift_px as f32, information_per_px2: 1e5, spread: group.even_spread(),
 ///         };
 ///         assert!(!analyzer.push(sample));
 ///     }

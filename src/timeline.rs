@@ -40,6 +40,34 @@ pub struct Spread {
     pub third_ns3: f32,
 }
 
+/// How a row's response falls off as the picture moves away from its reference, −q‴/q' of its phase-correlation function:
+/// the mean square of the texture's wave numbers. A row that moves while it is exposed is smeared out and responds less in
+/// the same measure, so a fast tone's amplitude needs it. Kept in 16 bits, to 0.4 %.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Curvature(u16);
+
+impl Curvature {
+    /// A texture of two pixels a period, 1/px²: none bends more.
+    const MOST_PER_PX2: f32 = 9.8;
+
+    /// From 1/px². What is no number, or below 0, is 0: nothing known, nothing corrected.
+    pub fn of_per_px2(per_px2: f32) -> Self {
+        let known = if per_px2 > 0.0 { per_px2 } else { 0.0 };
+        Self(
+            (known
+                .min(Self::MOST_PER_PX2)
+                .to_bits()
+                .saturating_add(0x8000)
+                >> 16) as u16,
+        )
+    }
+
+    /// In 1/px², 0 to 9.8.
+    pub fn per_px2(self) -> f32 {
+        f32::from_bits(u32::from(self.0) << 16)
+    }
+}
+
 /// Some neighbouring rows of one frame, combined.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {
@@ -48,6 +76,8 @@ pub struct Sample {
     /// Which group of rows: row / rows a sample. Samples of one slot share one unknown offset (their
     /// reference's own position).
     pub slot: u16,
+    /// Of its rows; 0 where it is not known.
+    pub curvature: Curvature,
     /// Middle of the exposure, weighted like the shift, ns on the camera's clock.
     pub time_ns: i64,
     /// Shift to the right against the reference, px.

@@ -4,7 +4,7 @@ use rowtone::analyzer::Analyzer;
 use rowtone::camera::Timing;
 use rowtone::report::Report;
 use rowtone::spectrum::{Config, StaticStorage};
-use rowtone::timeline::{Group, Sample, Spread};
+use rowtone::timeline::{Curvature, Group, Sample, Spread};
 
 struct Draw(u64);
 
@@ -99,6 +99,7 @@ fn nothing_panics_and_all_is_finite() {
                 };
                 let unit = (draw.next() >> 40) as f32 / (1 << 24) as f32;
                 let sample = Sample {
+                    curvature: Curvature::of_per_px2(draw.of(&odd)),
                     frame,
                     slot: if strange {
                         draw.of(&[slot, slot + 1, u16::MAX])

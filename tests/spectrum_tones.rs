@@ -260,6 +260,7 @@ fn ten_days_are_like_the_first_second() {
                 let t = (n * 10_000_000 + group.middle_ns(slot)) as f64 * 1e-9;
                 let shift = 0.1 * (TAU * 437.0 * t).cos() + 0.004 * noise.draw();
                 let ready = analyzer.push(rowtone::timeline::Sample {
+                    curvature: Default::default(),
                     frame,
                     slot,
                     time_ns,

@@ -5,7 +5,7 @@ use crate::spectrum::{
     Config, ConfigError, FrameMark, SampleBuffer, WindowMark, follow_spread, pack_weight, skew_of,
 };
 use crate::time::since;
-use crate::timeline::{Group, Sample, Spread};
+use crate::timeline::{Curvature, Group, Sample, Spread};
 
 /// Collects samples to windows.
 #[derive(Debug)]
@@ -32,6 +32,8 @@ pub struct Collector<'a> {
     seq: u32,
     dropped_samples: u32,
     dropped_windows: u32,
+    /// Of the sample stored last.
+    curvature: Curvature,
 }
 
 impl<'a> Collector<'a> {
@@ -65,6 +67,7 @@ impl<'a> Collector<'a> {
             seq: 0,
             dropped_samples: 0,
             dropped_windows: 0,
+            curvature: Curvature::default(),
         })
     }
 
@@ -226,6 +229,7 @@ impl<'a> Collector<'a> {
             }
         }
         let Some(newest) = self.newest() else { return };
+        self.curvature = sample.curvature;
         let column = self.column(self.held - 1);
         let at = usize::from(sample.slot) * self.capacity + column;
         let ring = &mut self.ring;
@@ -281,6 +285,7 @@ impl<'a> Collector<'a> {
             frames: frames as u16,
             lost_frames: lost.min(usize::from(u16::MAX)) as u16,
             lines,
+            curvature: self.curvature,
             short,
         });
         self.seq = self.seq.wrapping_add(1);
@@ -326,6 +331,7 @@ mod tests {
                 let complete = analyzer.push(Sample {
                     frame,
                     slot,
+                    curvature: Curvature::default(),
                     time_ns: start_ns + group.middle_ns(slot),
                     shift_px: 0.01 * ((frame * 7 + u32::from(slot) * 3) % 11) as f32,
                     information_per_px2: 1e4,

@@ -93,6 +93,13 @@ impl RowTable {
         self.shift_px(product - excess / self.px_per_product)
     }
 
+    /// −q‴/q' at rest, 1/px²: how fast the response falls off from there, k² for a texture of the one wave number k. 0
+    /// for a row without texture.
+    pub fn curvature_per_px2(&self) -> f32 {
+        let (quadratic, cubic) = self.inverse();
+        6.0 * (cubic - 2.0 * quadratic * quadratic)
+    }
+
     /// The coefficients of u² in px⁻¹ and of u³ in px⁻².
     #[inline(always)]
     fn inverse(&self) -> (f32, f32) {

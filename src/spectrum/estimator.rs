@@ -163,6 +163,7 @@ impl<'a> Estimator<'a> {
             group: &self.group,
             band,
             fps: l.fps,
+            curvature: self.mark.curvature,
         }
         .tones(&mut samples, &mut self.fit, &self.model);
         tones.more |= outcome.more;

@@ -29,6 +29,7 @@ mod phase;
 mod plan;
 mod rows;
 mod search;
+mod smear;
 mod storage;
 mod tones;
 mod window;

@@ -4,8 +4,9 @@ use super::config::Config;
 use super::detect::Band;
 use super::fit::{Fit, Model};
 use super::model::Samples;
+use super::smear::Smear;
 use crate::report::{MAX_PEAKS, Peak};
-use crate::timeline::Group;
+use crate::timeline::{Curvature, Group};
 
 /// Below this share of an amplitude left by exposure and averaging, a tone is not reported: its amplitude would
 /// be guessed.
@@ -57,6 +58,7 @@ pub(crate) struct Telling<'a> {
     pub(crate) group: &'a Group,
     pub(crate) band: Band,
     pub(crate) fps: f32,
+    pub(crate) curvature: Curvature,
 }
 
 impl Telling<'_> {
@@ -73,6 +75,7 @@ impl Telling<'_> {
         }
         let (low, high) = self.asked_hz();
         let regressors = fit.weigh(samples, model);
+        let smear = Smear::of(self.group, self.curvature, model);
         let mut list: heapless::Vec<(Peak, f32), MAX_PEAKS> = heapless::Vec::new();
         for (i, tone) in model.tones.iter().enumerate() {
             let hz = tone.frequency.hz();
@@ -84,11 +87,15 @@ impl Telling<'_> {
             let unit = fit.deviation(&regressors, model, i, samples.length_s);
             let kept = samples.kept(&samples.frame_means(i + 1));
             let power = samples.total_weight * amplitude * amplitude / (4.0 * variance).max(1e-30);
+            let amplitude_px = amplitude / attenuation;
+            let sd_px = noise * unit.amplitude_px / attenuation;
+            let smeared = smear.correction(amplitude_px, hz);
+            let doubt_px = smeared.doubt * amplitude_px;
             let peak = Peak {
                 hz,
                 hz_sd: noise * unit.hz,
-                amplitude_px: amplitude / attenuation,
-                amplitude_px_sd: noise * unit.amplitude_px / attenuation,
+                amplitude_px: amplitude_px * smeared.scale,
+                amplitude_px_sd: crate::kernel::sqrtf(sd_px * sd_px + doubt_px * doubt_px),
                 snr_db: 10.0 * libm::log10f(power.max(1e-9)),
                 ambiguous: self.near_multiple(hz, samples.length_s) || kept < KEPT_ENOUGH,
                 track: 0,

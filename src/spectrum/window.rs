@@ -6,7 +6,7 @@
 //! differently from frame to frame) is its skew, kept in small steps and applied to first order.
 
 use crate::time::since;
-use crate::timeline::{Group, Sample, Spread};
+use crate::timeline::{Curvature, Group, Sample, Spread};
 
 /// Samples as they are collected: shift, weight and skew, 8 bytes a sample.
 #[derive(Debug)]
@@ -117,6 +117,8 @@ pub struct WindowMark {
     pub lost_frames: u16,
     /// Rows measured in it.
     pub lines: u32,
+    /// Of its last sample's rows.
+    pub curvature: Curvature,
     /// Shorter than asked for.
     pub short: bool,
 }

@@ -6,7 +6,7 @@
 //! rows' own offsets would no longer be those of the other frames.
 
 use super::{
-    Displacement, Group, Sample, Spread,
+    Curvature, Displacement, Group, Sample, Spread,
     ladder::{Ladder, Moments},
 };
 
@@ -96,6 +96,8 @@ pub struct Binner {
     last_frame: Option<u32>,
     lost_frames: u32,
     thin_groups: u32,
+    /// Of the group being filled.
+    curvature: Curvature,
 }
 
 impl Binner {
@@ -108,7 +110,14 @@ impl Binner {
             last_frame: None,
             lost_frames: 0,
             thin_groups: 0,
+            curvature: Curvature::default(),
         }
+    }
+
+    /// What the tracker says of the rows to come ([`Tracker::curvature`](crate::tracker::Tracker::curvature)).
+    /// [`Tracker::push_into`](crate::tracker::Tracker::push_into) does it itself.
+    pub fn set_curvature(&mut self, curvature: Curvature) {
+        self.curvature = curvature;
     }
 
     /// Takes one row; gives the group before it, if this row begins another.
@@ -135,7 +144,8 @@ impl Binner {
             shift_px,
             information_per_px2: information.min(MOST_INFORMATION),
         };
-        let done = self.push_row(row, || d.time_ns);
+        let curvature = self.curvature;
+        let done = self.push_row(row, || (d.time_ns, curvature));
         let place = self.group.timing().start_ns(d.row - self.open.first_row);
         let later_ns = d
             .time_ns
@@ -144,20 +154,20 @@ impl Binner {
         done
     }
 
-    /// [`Binner::push`] for a row of this timing that is exposed when its place says. `middle_ns`: middle of
-    /// its exposure, on the camera's clock; asked where a group begins.
+    /// [`Binner::push`] for a row of this timing that is exposed when its place says. `begin`: middle of its
+    /// exposure, ns on the camera's clock, and the rows' curvature; asked where a group begins.
     #[inline(always)]
     pub(crate) fn push_row(
         &mut self,
         row: RowShift,
-        middle_ns: impl Fn() -> i64,
+        begin: impl Fn() -> (i64, Curvature),
     ) -> Option<Sample> {
         let open = &mut self.open;
         if row.row == open.next_row && row.row < open.end_row && row.frame == open.frame {
             open.add(row);
             return None;
         }
-        self.push_elsewhere(row, middle_ns())
+        self.push_elsewhere(row, begin())
     }
 
     /// The row pushed last was exposed so much later than its place says, ns.
@@ -172,7 +182,11 @@ impl Binner {
 
     /// A row that is not the next of its group.
     #[inline(never)]
-    fn push_elsewhere(&mut self, row: RowShift, middle_ns: i64) -> Option<Sample> {
+    fn push_elsewhere(
+        &mut self,
+        row: RowShift,
+        (middle_ns, curvature): (i64, Curvature),
+    ) -> Option<Sample> {
         if self.is_open_for(row.frame, row.row) {
             if row.row >= self.open.next_row {
                 self.open.skip_to(row.row);
@@ -181,6 +195,7 @@ impl Binner {
             return None;
         }
         let done = self.finish();
+        self.curvature = curvature;
         if self.open.frame != row.frame || self.last_frame.is_none() {
             self.count_lost(row.frame);
         }
@@ -238,6 +253,7 @@ impl Binner {
         Some(Sample {
             frame: open.frame,
             slot: open.slot,
+            curvature: self.curvature,
             time_ns: open.first_ns.saturating_add(later_ns),
             shift_px,
             information_per_px2,

@@ -120,12 +120,6 @@ impl Group {
     /// sinc(f·t_exp) · sin(πfRτ)/(R·sin(πfτ)), R rows of line time τ.
     pub fn attenuation(&self, hz: f32) -> f32 {
         use core::f32::consts::PI;
-        let exposure = PI * hz * self.timing.exposure_ns() as f32 * 1e-9;
-        let open = if exposure.abs() < 1e-3 {
-            1.0
-        } else {
-            sin(exposure) / exposure
-        };
         let line = PI * hz * self.timing.line_time_ps() as f32 * 1e-12;
         let rows = self.rows_per_sample as f32;
         let narrow = sin(line) * rows;
@@ -134,7 +128,18 @@ impl Group {
         } else {
             sin(line * rows) / narrow
         };
-        (open * rowed).abs()
+        (self.exposed(hz) * rowed).abs()
+    }
+
+    /// What is left of a tone's amplitude after the exposure alone, sinc(f·t_exp): below 0 where the exposure is
+    /// longer than a period.
+    pub fn exposed(&self, hz: f32) -> f32 {
+        let exposure = core::f32::consts::PI * hz * self.timing.exposure_ns() as f32 * 1e-9;
+        if exposure.abs() < 1e-3 {
+            1.0
+        } else {
+            sin(exposure) / exposure
+        }
     }
 }
 

@@ -24,7 +24,7 @@ const TURNS: u8 = 6;
 const TURNS_IN_A_HURRY: u8 = 2;
 
 /// Beyond this the row's polynomial is left for the next whole shift, px.
-pub(super) const NEAR_PX: f32 = 0.7;
+pub(super) const NEAR_PX: f32 = 0.55;
 
 impl Tracker<'_> {
     /// Σ h·p and Σ p of a whole line against its whole row: all that it takes where the picture has moved by

@@ -8,6 +8,7 @@ use crate::{
     noise::PixelNoise,
     pixel::Pixel,
     reference::RowTable,
+    timeline::Curvature,
 };
 
 /// What learning keeps of a row.
@@ -59,6 +60,7 @@ impl Tracker<'_> {
         self.range_px = 0.0;
         self.to_reference = 1.0;
         self.prediction = Prediction::default();
+        self.curvature = Curvature::default();
         self.blur.relearn();
         self.meter = NoiseMeter::default();
         self.watch = Watch::default();
@@ -101,6 +103,7 @@ impl Tracker<'_> {
             Stage::Tracking => {}
         }
         self.prediction.end_round(self.usual_information());
+        self.curvature = self.usual_curvature();
         self.blur.end_round();
         self.meter = NoiseMeter::default();
         self.range_px = 0.0;
@@ -287,6 +290,17 @@ impl Tracker<'_> {
                 (sum + information, n + 1.0)
             });
         sum / n.max(1.0)
+    }
+
+    /// Mean of the rows', weighted like their shifts.
+    fn usual_curvature(&self) -> Curvature {
+        let (mut sum, mut all) = (0.0f32, 0.0f32);
+        for table in self.storage.tables.iter() {
+            let information = table.information_per_px2();
+            sum += information * table.curvature_per_px2();
+            all += information;
+        }
+        Curvature::of_per_px2(sum / all)
     }
 
     fn build_all(&mut self) {

@@ -34,7 +34,7 @@ use crate::{
     camera::{Line, Pixels, UpperBytes},
     noise::{NoiseMeter, PixelNoise},
     reference::{Recipe, RowTable},
-    timeline::{Binner, Displacement, RowShift, Sample},
+    timeline::{Binner, Curvature, Displacement, RowShift, Sample},
 };
 use blur::Blur;
 use correlate::NEAR_PX;
@@ -93,6 +93,8 @@ pub struct Tracker<'a> {
     range_px: f32,
     watch: Watch,
     follow: Follow,
+    /// See [`Tracker::curvature`]; where lines are not unsmeared one by one.
+    curvature: Curvature,
     /// The row of this frame from which the reference is followed; none while learning.
     turn: usize,
     /// There is something to be done beside the next line: the reference is followed, or a lost picture
@@ -140,6 +142,7 @@ impl<'a> Tracker<'a> {
             range_px: 0.0,
             watch: Watch::default(),
             follow: Follow::default(),
+            curvature: Curvature::default(),
             turn: usize::MAX,
             beside: false,
             attend: 0,
@@ -178,6 +181,16 @@ impl<'a> Tracker<'a> {
     /// The rows' tables, one a row.
     pub fn tables(&self) -> &[RowTable] {
         self.storage.tables
+    }
+
+    /// Curvature of the rows, mean by information: what a fast tone's amplitude needs, told with every sample. 0 while
+    /// learning, and where the motion is so large that each line is corrected for its own smear.
+    pub fn curvature(&self) -> Curvature {
+        if self.prediction.is_swift() {
+            Curvature::default()
+        } else {
+            self.curvature
+        }
     }
 
     /// What became of the lines so far.
@@ -295,7 +308,7 @@ impl<'a> Tracker<'a> {
             shift_px,
             information_per_px2,
         };
-        let done = binner.push_row(row, || self.middle_ns(line));
+        let done = binner.push_row(row, || (self.middle_ns(line), self.curvature()));
         if let Some(delay_ns) = self.delay_ns() {
             binner.note_later(information_per_px2, delay_ns);
         }

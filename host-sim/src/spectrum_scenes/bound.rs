@@ -110,6 +110,7 @@ mod tests {
         // estimator.md section 4: σ_f = 0.78·σ/(A·T·√N), σ_A = σ·√(2/N).
         let samples: Vec<Sample> = (0..2000)
             .map(|i| Sample {
+                curvature: Default::default(),
                 frame: i,
                 slot: 0,
                 time_ns: i64::from(i) * 500_000,

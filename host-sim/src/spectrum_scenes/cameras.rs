@@ -208,6 +208,7 @@ pub(super) fn rows(camera: &Camera) -> Vec<Sample> {
         for (row, bound) in bounds.iter().enumerate() {
             let Some(bound) = bound else { continue };
             rows.push(Sample {
+                curvature: Default::default(),
                 frame: slot.number,
                 slot: row as u16,
                 time_ns: slot.start_ns + timing.middle_ns(row as u16),

@@ -86,6 +86,7 @@ pub fn run(days: u32, seed: u64, mut on: impl FnMut(&Day)) {
         for (slot, (&(s, c), &noise)) in phasors.iter().zip(&normals[from..]).enumerate() {
             let moved = AMPLITUDE_PX * (cos * c - sin * s) + creep;
             let ready = analyzer.push(Sample {
+                curvature: Default::default(),
                 frame: first.wrapping_add(n as u32),
                 slot: slot as u16,
                 time_ns: CLOCK_NS + late_ns + group.middle_ns(slot as u16),

@@ -164,6 +164,7 @@ impl Scene {
                 let time_ns = (start_s * 1e9).round() as i64 + group.middle_ns(slot);
                 let shift = offsets[usize::from(slot)] + draw.normal() / information.sqrt();
                 samples.push(Sample {
+                    curvature: Default::default(),
                     frame,
                     slot,
                     time_ns,

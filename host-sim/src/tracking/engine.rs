@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use rowtone::camera::Timing;
-use rowtone::timeline::Displacement;
+use rowtone::timeline::{Curvature, Displacement};
 use rowtone::tracker::{Config, ConfigError, Outcome, Storage, Tracker};
 
 use crate::failure::Failure;
@@ -127,6 +127,11 @@ impl<'a> Engine<'a> {
     /// Ends a round of learning.
     pub fn end_round(&mut self) {
         self.tracker.end_round();
+    }
+
+    /// What the tracker says of its rows, for the samples made of them.
+    pub fn curvature(&self) -> Curvature {
+        self.tracker.curvature()
     }
 
     /// Measures every line of a frame and hands what came of it to `take`.

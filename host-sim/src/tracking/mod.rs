@@ -296,6 +296,9 @@ impl<'a> Lines<'a> {
         shifts.note = note;
         shifts.rows.clear();
         shifts.samples.clear();
+        if let Some(binner) = &mut self.binner {
+            binner.set_curvature(self.moving.curvature());
+        }
         let (rows, samples) = (&mut shifts.rows, &mut shifts.samples);
         match (&mut self.still, &mut self.binner) {
             (None, Some(binner)) => {

@@ -185,6 +185,7 @@ mod tests {
                 let t = f64::from(frame) / 60.0 + f64::from(slot) * 0.7 / 60.0 / 50.0;
                 let tone = 0.4 * (TAU * 49.2 * t + 0.3).sin();
                 Sample {
+                    curvature: Default::default(),
                     frame,
                     slot: slot as u16,
                     time_ns: (t * 1e9) as i64,
