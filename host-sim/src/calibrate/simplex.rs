@@ -1,5 +1,8 @@
 //! Nelder and Mead's downhill simplex (1965).
 
+/// Costs of all corners within this part of each other: the bottom is reached.
+const FLAT: f64 = 1e-10;
+
 /// Where `cost` is least, from `start`; `size` is the first simplex's, 0 for what stays as it is.
 pub(super) fn minimum<const N: usize>(
     cost: impl Fn(&[f64; N]) -> f64,
@@ -18,6 +21,9 @@ pub(super) fn minimum<const N: usize>(
     for _ in 0..60 * N {
         simplex.sort_by(|a, b| a.1.total_cmp(&b.1));
         let worst = simplex[N];
+        if worst.1 - simplex[0].1 <= FLAT * simplex[0].1.abs() {
+            break;
+        }
         let centre: [f64; N] =
             std::array::from_fn(|k| simplex[..N].iter().map(|s| s.0[k]).sum::<f64>() / N as f64);
         let at = |t: f64| {
