@@ -91,6 +91,17 @@ impl Cholesky {
         x
     }
 
+    /// bᵀ·(L·Lᵀ)⁻¹·b.
+    pub fn inverse_form(&self, b: &[f64]) -> f64 {
+        let n = self.n;
+        let mut x = b.to_vec();
+        for i in 0..n {
+            let solved = dot(&self.l[i * n..i * n + i], &x[..i]);
+            x[i] = (x[i] - solved) / self.l[i * n + i];
+        }
+        dot(&x, &x)
+    }
+
     /// Column `j` of the inverse.
     pub fn inverse_column(&self, j: usize) -> Vec<f64> {
         let mut unit = vec![0.0; self.n];
@@ -158,6 +169,8 @@ mod tests {
         assert!(m.factor().is_none(), "rank one");
         m.add_outer(&[0.0, 1.0], 3.0);
         let x = m.factor().unwrap().solve(&[5.0, 16.0]);
+        // [5 16]·x, x = [1 2].
+        assert!((m.factor().unwrap().inverse_form(&[5.0, 16.0]) - 37.0).abs() < 1e-9);
         assert!((x[0] - 1.0).abs() < 1e-12 && (x[1] - 2.0).abs() < 1e-12);
         assert_eq!(m.at(0, 1), m.at(1, 0));
     }

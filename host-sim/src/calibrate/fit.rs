@@ -30,6 +30,8 @@ pub struct Fit {
     pub parameters: usize,
     /// Standard deviation of the model's `per_row`.
     pub per_row_sd: f64,
+    /// How far a wave form that the rows cannot show may bend `per_row`.
+    pub not_met: f64,
 }
 
 impl Fit {
@@ -55,6 +57,22 @@ pub struct Problem<'a> {
     pub used: Vec<Vec<bool>>,
     /// What b and g may be.
     pub background: Background,
+}
+
+/// Fewer values than this to a parameter: leverage is worth its time.
+const FEW_VALUES: usize = 40;
+/// A value is not believed to be explained by more than this: it would count for nothing but itself.
+const MOST_LEVERAGE: f64 = 0.9;
+
+/// How much of a value's own error the fit follows.
+#[derive(Clone, Copy, PartialEq)]
+enum Leverage {
+    /// The same for all.
+    Mean,
+    /// Each value's own share of b and g, the same share of the rest.
+    Linear,
+    /// Each value's own.
+    Each,
 }
 
 /// Values that share their linear parameters.
@@ -294,18 +312,52 @@ impl<'a> Problem<'a> {
                 }
             }
         }
-        self.finish(&groups, model, rss)
+        self.finish(&groups, model, rss, Leverage::Mean)
+    }
+
+    /// `fit` again with the leverage of every value taken into account, which takes longer: for the last fit.
+    pub fn with_leverage(&self, fit: Fit) -> Fit {
+        // Where there are hundreds of values to a parameter it makes no difference.
+        let each = fit.model.parameters() * FEW_VALUES > fit.count;
+        let leverage = if each {
+            Leverage::Each
+        } else {
+            Leverage::Linear
+        };
+        let again = self.finish(&self.groups(), fit.model.clone(), fit.rss, leverage);
+        again.map_or(fit.clone(), |again| Fit {
+            not_met: fit.not_met,
+            ..again
+        })
     }
 
     /// Residuals, b, g and the standard deviation of ν.
-    fn finish(&self, groups: &[Group], model: Model, rss: f64) -> Option<Fit> {
+    fn finish(&self, groups: &[Group], model: Model, rss: f64, leverage: Leverage) -> Option<Fit> {
         let (normal, _) = self.normal_equations(groups, &model)?;
-        let inverse = normal.factor()?.inverse_column(0);
+        let factor = normal.factor()?;
+        let inverse = factor.inverse_column(0);
         let (frames, height) = (self.rows.len(), self.height());
         let mut influence = vec![vec![0.0; height]; frames];
         let mut residual = vec![vec![0.0; height]; frames];
         let (mut offset, mut gain) = (vec![f64::NAN; height], vec![f64::NAN; height]);
         let (mut count, mut parameters) = (0, model.parameters());
+        let all: usize = groups.iter().map(|g| g.cells.len()).sum();
+        let linear: usize = groups.iter().map(|g| 2 * g.smooth.len()).sum();
+        let mean_leverage = (linear + parameters) as f64 / all.max(1) as f64;
+        let full_line =
+            |line: &[f64], n: usize, i: usize, explained: &[Vec<f64>], solved: &Solved| {
+                let frames = model.phases.len();
+                let mut full = vec![0.0; model.parameters()];
+                full[0] = line[0];
+                full[1 + n] = line[1];
+                full[1 + frames..].copy_from_slice(&line[2..]);
+                for (q, vector) in solved.basis.iter().zip(explained) {
+                    for (slot, value) in full.iter_mut().zip(vector) {
+                        *slot -= q[i] * value;
+                    }
+                }
+                full
+            };
         for group in groups {
             let solved = self.solve(group, &model, true)?;
             let (lines, explained) = self.slopes(group, &model, &solved);
@@ -324,14 +376,27 @@ impl<'a> Problem<'a> {
                         .zip(&shared)
                         .map(|(q, s)| q[i] * s)
                         .sum::<f64>();
+                let explained_share = match leverage {
+                    Leverage::Mean => mean_leverage,
+                    _ => {
+                        let linear: f64 = solved.basis.iter().map(|q| q[i] * q[i]).sum();
+                        linear
+                            + if leverage == Leverage::Each {
+                                factor.inverse_form(&full_line(line, n, i, &explained, &solved))
+                            } else {
+                                model.parameters() as f64 / all as f64
+                            }
+                    }
+                };
                 residual[n][y] = solved.residual[i];
-                influence[n][y] = weight * solved.residual[i];
+                // A value that the fit follows closely leaves little: what it would have left of itself.
+                influence[n][y] =
+                    weight * solved.residual[i] / (1.0 - explained_share.min(MOST_LEVERAGE));
                 offset[y] = solved.offset[i];
                 gain[y] = solved.gain[i];
             }
         }
-        let lost = count as f64 / count.saturating_sub(parameters).max(1) as f64;
-        let variance = lost * uncertainty::variance(&influence, &residual);
+        let variance = uncertainty::variance(&influence, &residual);
         Some(Fit {
             model,
             offset,
@@ -341,6 +406,7 @@ impl<'a> Problem<'a> {
             count,
             parameters,
             per_row_sd: variance.max(0.0).sqrt(),
+            not_met: 0.0,
         })
     }
 }

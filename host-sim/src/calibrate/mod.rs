@@ -101,7 +101,10 @@ pub fn calibrate_with_stripes(
     let (hz, hz_sd, verdict) = match light {
         Light::Known { hz, hz_sd, .. } => {
             let verdict = times.map_or(Verdict::Undecided, |t| {
-                frames::judge(&fit.model.phases, t, hz)
+                // A frame's stripes tell their number and their phase, by the lever of a straight line.
+                let frames = fit.residual.len() as f64;
+                let phase_sd = fit.per_row_sd * (frames / 12.0).sqrt() * rows as f64;
+                frames::judge(&fit.model.phases, t, hz, phase_sd)
             });
             (hz, hz_sd, verdict)
         }

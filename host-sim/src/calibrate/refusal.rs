@@ -143,7 +143,7 @@ impl fmt::Display for Refusal {
                 f.write_str(" Hz...; add --about-hz, or record at two frame rates with --pts")
             }
             Self::FewPhases => f.write_str(
-                "the stripes come back to the same few places in every frame and hide in the scene's own texture: change the light's frequency a little, or light a plain surface",
+                "the stripes come back to the same few places in every frame and hide in the scene's own texture: record longer, change the light's frequency a little, or light a plain surface",
             ),
             Self::NoFrameTimes => f.write_str("an unknown light needs a video of at least 4 frames and its frame rate"),
             Self::Incoherent => f.write_str("the frames do not keep one phase: lost frames without --pts, or a light that is not steady"),

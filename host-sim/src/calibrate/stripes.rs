@@ -18,6 +18,10 @@ const LEAST_EXPLAINED: [f64; 2] = [0.7, 0.5];
 const OWN_ROWS: f64 = 1.4;
 /// With fewer harmonics than this a switched light is not met well enough.
 const FEWEST_TOLD_APART: usize = 4;
+/// Periods in a frame below which the picture behind the stripes must not be taken for smooth.
+const LEAST_PERIODS_OF_SMOOTH: f64 = 2.0;
+/// Values to each harmonic in a few frames.
+const VALUES_A_HARMONIC: usize = 12;
 /// Frames used where the stripes stand still.
 const MOST_STILL_FRAMES: usize = 12;
 
@@ -96,11 +100,8 @@ pub fn find(rows: &Rows, most_harmonics: usize) -> Result<Stripes, Refusal> {
             .ok_or(Refusal::NoStripes)?;
     }
     let limit = |fit: &Fit, background| {
-        let rows_show = if frames < 4 {
-            (0.48 / fit.model.per_row) as usize
-        } else {
-            points_show(&fit.model, height)
-        };
+        let rows_show =
+            points_show(&fit.model, height).min(rows.len() * height / VALUES_A_HARMONIC);
         let frames_show = if background == Background::PerRow {
             told_apart(&fit.model.phases)
         } else {
@@ -108,14 +109,25 @@ pub fn find(rows: &Rows, most_harmonics: usize) -> Result<Stripes, Refusal> {
         };
         most_harmonics.min(rows_show).min(frames_show).max(1)
     };
-    // Most pictures are smooth from row to row: to say so spares two unknowns a row.
+    // Most pictures are smooth from row to row: to say so spares two unknowns a row. But less than two periods are like
+    // a smooth picture themselves.
+    let periods = fit.model.per_row * height as f64;
     let found = if background == Background::PerRow {
-        match grown(rows, Background::Smooth(4), fit.clone(), limit) {
-            Ok(smooth) if !has_own_rows(&smooth.fit) => smooth,
+        let simple = (periods >= LEAST_PERIODS_OF_SMOOTH).then(|| {
+            grown(
+                rows,
+                smooth(fit.model.per_row),
+                fit.clone(),
+                limit,
+                most_harmonics,
+            )
+        });
+        match simple {
+            Some(Ok(smooth)) if !has_own_rows(&smooth.fit) => smooth,
             smooth => {
-                let own = grown(rows, background, fit, limit)?;
+                let own = grown(rows, background, fit, limit, most_harmonics)?;
                 match smooth {
-                    Ok(smooth) if smooth.fit.bic() < own.fit.bic() => smooth,
+                    Some(Ok(smooth)) if smooth.fit.bic() < own.fit.bic() => smooth,
                     _ if told_apart(&own.fit.model.phases)
                         < FEWEST_TOLD_APART.min(most_harmonics) =>
                     {
@@ -126,7 +138,7 @@ pub fn find(rows: &Rows, most_harmonics: usize) -> Result<Stripes, Refusal> {
             }
         }
     } else {
-        grown(rows, background, fit, limit)?
+        grown(rows, background, fit, limit, most_harmonics)?
     };
     let Grown {
         problem,
@@ -141,6 +153,8 @@ pub fn find(rows: &Rows, most_harmonics: usize) -> Result<Stripes, Refusal> {
         });
     }
     fundamental::check(&problem, &fit, limit)?;
+    let mut fit = problem.with_leverage(fit);
+    fit.per_row_sd = fit.per_row_sd.hypot(fit.not_met);
     check_quality(&problem, &fit)?;
     Ok(Stripes {
         background: problem.background,
@@ -161,16 +175,17 @@ fn grown(
     background: Background,
     start: Fit,
     limit: impl Fn(&Fit, Background) -> usize,
+    wanted: usize,
 ) -> Result<Grown<'_>, Refusal> {
     let mut problem = Problem::new(rows, background);
     let mut first = start.model;
     first.harmonics.truncate(2);
     let fit = problem.fit(&first, 8).ok_or(Refusal::NoStripes)?;
     let most = limit(&fit, background);
-    let mut fit = grow(&problem, fit, most);
+    let mut fit = grow(&problem, fit, most, wanted);
     let left_out = outliers::leave_out(&mut problem, &mut fit, |problem, fit| {
         let again = problem.fit(&fit.model, 12).ok_or(Refusal::NoStripes)?;
-        Ok(grow(problem, again, most))
+        Ok(grow(problem, again, most, wanted))
     })?;
     Ok(Grown {
         problem,
@@ -301,9 +316,10 @@ fn first_model(rows: &Rows, per_row: f64) -> Model {
 
 /// More harmonics, as long as they pay for themselves.
 ///
-/// Where they still do at `limit`, the wave form is not met: what the last ones moved ν by is then added to its standard
-/// deviation. (In a few frames the rows cannot show more, and what is left is in the residuals of their neighbours.)
-fn grow(problem: &Problem<'_>, mut fit: Fit, limit: usize) -> Fit {
+/// Where they still do at `limit`, because the rows lie at too few places of the period for the `wanted` ones, what is left
+/// of the wave form looks like fewer harmonics and bends ν: what the last ones moved it by is then added to its standard
+/// deviation. (In a few frames what is left shows in the residuals.)
+fn grow(problem: &Problem<'_>, mut fit: Fit, limit: usize, wanted: usize) -> Fit {
     let mut misses = 0;
     let mut moved = 0.0;
     for &count in LADDER.iter().filter(|&&c| c <= limit) {
@@ -325,9 +341,11 @@ fn grow(problem: &Problem<'_>, mut fit: Fit, limit: usize) -> Fit {
             break;
         }
     }
-    if misses == 0 && problem.rows.len() >= 4 {
-        fit.per_row_sd = fit.per_row_sd.hypot(moved);
-    }
+    fit.not_met = if misses == 0 && limit < wanted && problem.rows.len() >= 4 {
+        moved.abs()
+    } else {
+        0.0
+    };
     fit
 }
 
@@ -378,7 +396,7 @@ fn check_quality(problem: &Problem<'_>, fit: &Fit) -> Result<(), Refusal> {
     let least = if problem.background == Background::PerRow {
         1.0
     } else {
-        2.0
+        LEAST_PERIODS_OF_SMOOTH
     };
     if periods < least {
         return Err(Refusal::TooFewPeriods { periods, least });

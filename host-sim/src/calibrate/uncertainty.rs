@@ -1,6 +1,8 @@
 //! How sure the stripes a row are, from what the fit leaves.
 //!
-//! The error of ν is a weighted sum of the noise: its variance is that of Σ u, u = weight · residual ("sandwich").
+//! The error of ν is a weighted sum of the noise: its variance is that of Σ u ("sandwich"), u = weight · residual /
+//! (1 − leverage): what the value would be off from a fit without it, as in a jackknife ("HC3", MacKinnon and White 1985).
+//! The edges of the stripes tell ν, few values lie on them, and the fit follows those more closely than others.
 //! Two estimates of it are put together:
 //!
 //! - over neighbouring rows: Σ u² and the products of rows as far apart as the residuals are really correlated, which
@@ -17,14 +19,16 @@ use crate::linear::dot;
 
 /// Degrees of freedom that the estimate over rows counts for.
 const ROWS_COUNT_FOR: f64 = 12.0;
+/// Residuals are correlated over no more than this part of the frame: over more, an estimate would rest on few pieces.
+const MOST_LAGS: usize = 16;
 /// Lags in a row that must be insignificant.
 const SILENT_LAGS: usize = 5;
 
 /// Variance of the sum of `influence`, `[frame][row]`; `residual` (0 where a value was left out) tells how far rows hang
-/// together. What the fit itself has taken from the residuals is not made up for here.
+/// together. What the fit itself has taken from the residuals is made up for in `influence` already.
 pub(super) fn variance(influence: &[Vec<f64>], residual: &[Vec<f64>]) -> f64 {
     let height = residual.first().map_or(0, Vec::len);
-    let over_rows = rows(influence, correlated_lags(residual, height / 4));
+    let over_rows = rows(influence, correlated_lags(residual, height / MOST_LAGS));
     let frames = influence.len() as f64;
     if frames < 2.0 {
         return over_rows;
@@ -78,8 +82,8 @@ fn rows(influence: &[Vec<f64>], last: usize) -> f64 {
         let weight = (2.0 - lag as f64 / last as f64).min(1.0);
         sum += 2.0 * weight * product(influence, lag);
     }
-    // The estimate can come out negative; neighbours that cancel are not believed to halve the error.
-    sum.max(0.25 * white)
+    // The estimate can come out negative; that neighbours cancel is not believed.
+    sum.max(white)
 }
 
 #[cfg(test)]
