@@ -231,6 +231,11 @@ impl Tracker<'_> {
             || !Flicker::is_plausible(before, self.to_reference);
         let mut jumped = false;
         if due {
+            // A swift picture must be found anew after a gap, and a row that knows so little could take any
+            // place for it.
+            if self.prediction.needs_more_than(information_per_px2) {
+                return Err(Left::NoTexture);
+            }
             let Some(looked) = self.look_and_follow(row, &table, pixels.pixels(), shift_px) else {
                 return Err(Left::Disturbed);
             };
@@ -262,9 +267,6 @@ impl Tracker<'_> {
         pixels: &[P],
         shift_px: f32,
     ) -> Option<f32> {
-        if self.prediction.needs_more_than(table.information_per_px2()) {
-            return None;
-        }
         let looked = self.look(row, table, pixels, shift_px);
         if let Some(shift_px) = looked
             && self.turn == row
