@@ -4,7 +4,7 @@
 mod common;
 
 use common::{HZ, PX, assert_the_tone, command, config, file, on_clip, reports, texts, y4m};
-use host_sim::sim::{Config, Flicker, Hand, Scene, Step, Tone};
+use host_sim::sim::{Config, Flicker, Hand, Rect, Scene, Step, Tone};
 use serde_json::Value;
 
 /// The reports on a recording.
@@ -178,4 +178,71 @@ fn a_shaking_tripod_is_told_from_the_machine() {
         "{machine}"
     );
     assert!(amplitude_px(&machine, 31.2) < 0.02 * 0.3, "{machine}");
+}
+
+/// Half of the columns vibrate by 0.02 px, of which a row of a strip sees nothing.
+#[test]
+fn a_part_that_vibrates_by_less_than_a_row_can_tell_is_found() {
+    let mut config = Config {
+        frames: 60,
+        vibrating: Some(Rect {
+            x: 64,
+            y: 0,
+            w: 64,
+            h: 300,
+        }),
+        ..Config::default()
+    };
+    config.motion.tones.push(Tone {
+        hz: 83.2,
+        amplitude_px: 0.02,
+        phase_rad: 0.4,
+    });
+    let clip = file("fooled-part.y4m", &y4m(config));
+    let path = clip.to_str().expect("a plain path");
+    let analyzed = |roi: &str| {
+        let camera = ["--line-time-us", "40", "--exposure-us", "500"];
+        let args = [
+            &["analyze", path, "--format", "json", "--roi", roi],
+            &camera[..],
+        ];
+        let output = command(args.concat()).output().expect("it runs");
+        let (stdout, stderr) = texts(&output);
+        (reports(&stdout).remove(0), stderr)
+    };
+    let (full, told) = analyzed("full");
+    assert!(amplitude_px(&full, 83.2) < 0.6 * 0.02 && told.is_empty());
+    let (auto, told) = analyzed("auto");
+    assert!(told.contains("--roi auto measures 64,0,64,300"), "{told}");
+    let share = amplitude_px(&auto, 83.2) / 0.02;
+    assert!((share - 1.0).abs() < 0.05, "{share}");
+}
+
+/// The rows at the horizon know too little to find a swift picture again; nothing passes through it.
+#[test]
+fn a_sky_over_a_swift_picture_is_no_disturbance() {
+    let mut config = Config {
+        frames: 60,
+        scene: Scene::Photo { sky: 0.1 },
+        ..Config::default()
+    };
+    config.sensor.cols = 256;
+    config.sensor.line_time_ps = 33_670_000;
+    config.sensor.exposure_ns = 200_000;
+    config.motion.tones.push(Tone {
+        hz: 203.7,
+        amplitude_px: 4.0,
+        phase_rad: 0.4,
+    });
+    let clip = file("fooled-sky.y4m", &y4m(config));
+    let path = clip.to_str().expect("a plain path");
+    let camera = ["--line-time-us", "33.67", "--exposure-us", "200"];
+    let args = [&["analyze", path, "--format", "json"], &camera[..]];
+    let output = command(args.concat()).output().expect("it runs");
+    let report = reports(&texts(&output).0).remove(0);
+    assert!(!has_warning(&report, "disturbed"), "{report}");
+    assert!(
+        (amplitude_px(&report, 203.7) / 4.0 - 1.0).abs() < 0.01,
+        "{report}"
+    );
 }

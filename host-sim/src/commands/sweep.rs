@@ -4,7 +4,7 @@ use std::io::Write;
 
 use crate::calibrate::study;
 use crate::failure::Failure;
-use crate::line_scenes::{case, table as line_table};
+use crate::line_scenes::{case, region, table as line_table};
 use crate::output::Out;
 use crate::spectrum_scenes::score::Score;
 use crate::spectrum_scenes::{cameras, days, few, table};
@@ -33,6 +33,26 @@ enum What {
     Calibration(Calibration),
     /// Simulated recordings through the line engine: noise over the bound, amplitude, what it invents
     Lines(Lines),
+    /// What `--roi auto` chooses where all of the picture vibrates, or a part of it
+    Region(Region),
+}
+
+/// Options of `rowtone sweep region`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Every preset and scene at full size, 30 frames. Columns: share of the width and of the rows that is chosen; share of
+the tone's amplitude that would be measured in the whole picture, and in what is chosen; how far the tone stands out
+of the noise there, against the whole picture, and how far it could in exactly what vibrates.
+
+Example:
+  rowtone sweep region --only 'ov5647 speckle'")]
+struct Region {
+    /// Only recordings with this in their name
+    #[arg(long, value_name = "TEXT", default_value = "")]
+    only: String,
+    /// Which series of recordings
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
 }
 
 /// Options of `rowtone sweep calibration`.
@@ -69,6 +89,9 @@ struct Lines {
     /// A part of each picture, and fewer frames
     #[arg(long)]
     quick: bool,
+    /// Only recordings with this in their name
+    #[arg(long, value_name = "TEXT", default_value = "")]
+    only: String,
     /// As a microcontroller does it: everything beside a line in steps of so many columns
     #[arg(long, value_name = "COLUMNS")]
     in_steps_of: Option<u16>,
@@ -167,6 +190,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         What::Days(options) => many_days(options),
         What::Calibration(options) => calibration(options),
         What::Lines(options) => lines(options),
+        What::Region(options) => regions(options),
     }
 }
 
@@ -193,8 +217,22 @@ fn lines(options: &Lines) -> Result<(), Failure> {
     let failed = |error| Failure::writing("standard output", &error);
     writeln!(out, "{}", line_table::head()).map_err(failed)?;
     for mut case in cases {
+        if !case.name.contains(&options.only) {
+            continue;
+        }
         case.columns_per_line = options.in_steps_of;
         writeln!(out, "{}", line_table::row(&case)).map_err(failed)?;
+    }
+    Ok(())
+}
+
+fn regions(options: &Region) -> Result<(), Failure> {
+    let mut out = Out::default();
+    out.line(&region::head())?;
+    for case in region::cases(options.seed) {
+        if case.name.contains(&options.only) {
+            out.line(&region::row(&case))?;
+        }
     }
     Ok(())
 }

@@ -24,7 +24,7 @@ pub struct Case {
 }
 
 /// The scenes of the figures.
-fn scenes() -> [(&'static str, Scene); 4] {
+pub(super) fn scenes() -> [(&'static str, Scene); 4] {
     [
         ("speckle", Scene::Speckle { grain_px: 2.0 }),
         ("bar", Scene::Bar { width_px: 30.0 }),
@@ -33,7 +33,7 @@ fn scenes() -> [(&'static str, Scene); 4] {
     ]
 }
 
-fn tone(hz: f64, amplitude_px: f64) -> Tone {
+pub(super) fn tone(hz: f64, amplitude_px: f64) -> Tone {
     Tone {
         hz,
         amplitude_px,
@@ -41,7 +41,7 @@ fn tone(hz: f64, amplitude_px: f64) -> Tone {
     }
 }
 
-fn lens() -> Optics {
+pub(super) fn lens() -> Optics {
     Optics {
         blur_px: Optics::blur_for_cutoff(0.1),
         ..Config::default().optics

@@ -3,4 +3,5 @@
 
 pub mod case;
 pub mod measure;
+pub mod region;
 pub mod table;

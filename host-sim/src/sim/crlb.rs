@@ -5,6 +5,8 @@
 //! normal, its own dependence on d left out). Here `r` is the noise-free row at rest under steady
 //! light, in DN, and `var` has shot noise, read noise and quantisation.
 
+use std::ops::Range;
+
 use serde::Serialize;
 
 use super::camera::Camera;
@@ -34,12 +36,18 @@ pub fn row_bounds_px(camera: &Camera) -> Vec<Option<f64>> {
 }
 
 fn row_bound_px(camera: &Camera, row: u32) -> Option<f64> {
+    let information = information_per_px2(camera, row, camera.config().moving_cols(row)?);
+    // Less than this is the rounding of the texture, not texture.
+    (information > 1e-4).then(|| 1.0 / information.sqrt())
+}
+
+/// Fisher information of some columns of a row about its displacement, 1/px².
+pub fn information_per_px2(camera: &Camera, row: u32, cols: Range<u32>) -> f64 {
     let config = camera.config();
     let disturbed = &config.disturbances;
     if disturbed.saturated_rows.contains(&row) || disturbed.black_rows.contains(&row) {
-        return None;
+        return 0.0;
     }
-    let cols = config.moving_cols(row)?;
     let (y, first) = (row as usize, cols.start);
     let cols = cols.start as usize..cols.end as usize;
     let levels = camera.texture().row(y, cols.clone(), 0.0);
@@ -56,8 +64,7 @@ fn row_bound_px(camera: &Camera, row: u32) -> Option<f64> {
             information += slope_dn * slope_dn / camera.pixels().variance_dn2(level);
         }
     }
-    // Less than this is the rounding of the texture, not texture.
-    (information > 1e-4).then(|| 1.0 / information.sqrt())
+    information
 }
 
 /// The bounds in short; `None` when no row knows anything.

@@ -9,7 +9,7 @@
 
 mod background;
 mod engine;
-mod region;
+pub mod region;
 
 use rowtone::timeline::{Binner, Displacement, Group, Sample};
 
@@ -144,7 +144,7 @@ fn run(mut feed: Feed, part: Rect, groups: Option<Group>, mut to: Outlet<FrameSh
     let (kept, ending) = keep_first(&mut feed);
     let whole = Region::whole(&part);
     let region = match feed.camera.part.is_none() {
-        true => region::choose(&kept, &part),
+        true => region::choose(&kept, &part, &feed.camera.timing),
         false => whole.clone(),
     };
     let note = (region != whole).then(|| told(&region, &feed.camera));
@@ -170,7 +170,7 @@ fn told(region: &Region, camera: &Camera) -> String {
     let (width, height) = camera.size;
     let part = camera.turn.back().part(part, width, height);
     format!(
-        "--roi auto measures {},{},{},{}: the rest stands still (--roi full for all of it)",
+        "--roi auto measures {},{},{},{}: the rest does not move with it (--roi full for all of it)",
         part.x, part.y, part.width, part.height
     )
 }
