@@ -4,7 +4,7 @@ use std::io::Write;
 
 use crate::calibrate::study;
 use crate::failure::Failure;
-use crate::line_scenes::{case, region, table as line_table};
+use crate::line_scenes::{case, region, slips, table as line_table};
 use crate::output::Out;
 use crate::spectrum_scenes::score::Score;
 use crate::spectrum_scenes::{cameras, days, few, table};
@@ -35,6 +35,24 @@ enum What {
     Lines(Lines),
     /// What `--roi auto` chooses where all of the picture vibrates, or a part of it
     Region(Region),
+    /// How often stripes are read at the wrong stripe where they move by 8 px peak to peak
+    Stripes(Stripes),
+}
+
+/// Options of `rowtone sweep stripes`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Recordings of 0.4 s whose amplitude is off by more than 1 %, for each distance of the stripes and each frequency.
+
+Example:
+  rowtone sweep stripes --recordings 10")]
+struct Stripes {
+    /// Recordings at each frequency, of different phase
+    #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u64).range(1..))]
+    recordings: u64,
+    /// Which series of recordings
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
 }
 
 /// Options of `rowtone sweep region`.
@@ -191,6 +209,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         What::Calibration(options) => calibration(options),
         What::Lines(options) => lines(options),
         What::Region(options) => regions(options),
+        What::Stripes(options) => stripes(options),
     }
 }
 
@@ -233,6 +252,15 @@ fn regions(options: &Region) -> Result<(), Failure> {
         if case.name.contains(&options.only) {
             out.line(&region::row(&case))?;
         }
+    }
+    Ok(())
+}
+
+fn stripes(options: &Stripes) -> Result<(), Failure> {
+    let mut out = Out::default();
+    out.line(&slips::head())?;
+    for period_px in slips::PERIODS_PX {
+        out.line(&slips::row(period_px, options.seed, options.recordings))?;
     }
     Ok(())
 }

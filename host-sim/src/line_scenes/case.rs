@@ -84,7 +84,7 @@ pub fn small_motion(seed: u64, rows: u32, frames: u32) -> Vec<Case> {
 }
 
 /// 256 x 300 px of speckle at 60 frames a second, exposed for 0.2 ms, `seconds` after 20 frames of learning.
-fn usual(seed: u64, name: &str, tones: Vec<Tone>, seconds: f64) -> Case {
+pub(super) fn usual(seed: u64, name: &str, tones: Vec<Tone>, seconds: f64) -> Case {
     let mut config = Config {
         seed,
         scene: Scene::Speckle { grain_px: 2.0 },

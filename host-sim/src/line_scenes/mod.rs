@@ -4,4 +4,5 @@
 pub mod case;
 pub mod measure;
 pub mod region;
+pub mod slips;
 pub mod table;
