@@ -26,8 +26,15 @@ impl PixelNoise {
     }
 
     /// Variance of a pixel of this value; never below that of quantisation, 1/12.
+    #[inline]
     pub fn variance(&self, value: f32) -> f32 {
-        (self.dark + self.per_value * value.max(0.0)).max(LEAST_VARIANCE)
+        let value = if value > 0.0 { value } else { 0.0 };
+        let variance = self.dark + self.per_value * value;
+        if variance > LEAST_VARIANCE {
+            variance
+        } else {
+            LEAST_VARIANCE
+        }
     }
 }
 

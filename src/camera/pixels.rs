@@ -34,6 +34,7 @@ impl<'a> Pixels<'a> {
 
     /// `width` pixels from `first` on; `None` where the line ends before, or where `first` lies within pixels that share
     /// bytes.
+    #[inline]
     pub fn part(&self, first: usize, width: usize) -> Option<Self> {
         let all = first..first.checked_add(width)?;
         Some(match self {

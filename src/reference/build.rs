@@ -79,6 +79,8 @@ pub struct Build {
     recipe: Recipe,
     /// How many frames the reference is the mean of.
     frames: f32,
+    /// Pixel values in one reference count: a power of two, so that no bit differs from a division.
+    per_count: f32,
     step: Step,
     column: usize,
     /// Σ r, in counts.
@@ -133,6 +135,7 @@ impl Build {
         Self {
             recipe: *recipe,
             frames: frames.max(1.0),
+            per_count: 1.0 / recipe.counts_per_value,
             step: Step::Weigh,
             column: 0,
             total: 0,
@@ -236,8 +239,9 @@ impl Build {
         None
     }
 
+    #[inline(always)]
     fn value(&self, count: u16) -> f32 {
-        f32::from(count) / self.recipe.counts_per_value
+        f32::from(count) * self.per_count
     }
 
     /// Mean of the row so far: r is taken against it, for the sake of single precision.
@@ -252,24 +256,27 @@ impl Build {
         // What came in from beyond the ends was not averaged: there the first frame's noise still stands.
         let reach = (r.level.half_filter().len() + UNKNOWN_STEPS) * r.stride;
         let edge = r.margin_px + MAX_HALF * r.stride;
-        for x in span {
-            let (Some(w), Some(&count)) = (w.get_mut(x), mean.get(x)) else {
-                return;
-            };
-            self.total += u64::from(count);
-            *w = 0.0;
-            let value = self.value(count);
-            let from_edge = x.min(mean.len() - 1 - x);
-            if value >= r.saturation || from_edge < reach {
-                continue;
-            }
-            let mask = mask.get(x).copied().unwrap_or(0);
+        let last = mean.len().saturating_sub(1);
+        let (Some(w), Some(mean), Some(mask)) = (
+            w.get_mut(span.clone()),
+            mean.get(span.clone()),
+            mask.get(span.clone()),
+        ) else {
+            return;
+        };
+        self.total += mean.iter().map(|&count| u64::from(count)).sum::<u64>();
+        // Nothing but arithmetic, so that a desktop does several columns at once.
+        for (((w, &count), &mask), x) in w.iter_mut().zip(mean).zip(mask).zip(span) {
+            let value = f32::from(count) * self.per_count;
+            let from_edge = x.min(last.saturating_sub(x));
             // A soft edge over four pixels, so that a picture moving past it changes little at a time.
             let ramp = match r.margin_px {
                 0 => 1.0,
-                _ => (from_edge + 4).saturating_sub(edge).min(4) as f32 / 4.0,
+                _ => (from_edge + 4).saturating_sub(edge).min(4) as u8 as f32 / 4.0,
             };
-            *w = ramp * f32::from(mask) / 255.0 / r.noise.variance(value);
+            let full = ramp * f32::from(mask) / 255.0 / r.noise.variance(value);
+            let used = (value < r.saturation) & (from_edge >= reach);
+            *w = if used { full } else { 0.0 };
         }
     }
 
@@ -310,6 +317,7 @@ impl Build {
         if span.start == 0 {
             self.energy = h.iter().take(ENERGY_REACH).map(|h| h * h).sum();
         }
+        let (noise_of, mut running) = (self.recipe.noise, self.energy);
         for x in span {
             let ahead = h.get(x + ENERGY_REACH).map_or(0.0, |h| h * h);
             let (Some(h), Some(w), Some(&c)) = (h.get_mut(x), w.get_mut(x), mean.get(x)) else {
@@ -317,15 +325,14 @@ impl Build {
             };
             // A running sum over the columns x ± ENERGY_REACH, as they were before this step. What
             // rounding leaves behind is far below the noise.
-            self.energy += ahead;
-            let energy = self.energy;
-            let own = &mut self.before[x % RING];
-            *own = *h * *h;
-            let behind = (x + RING - ENERGY_REACH) % RING;
+            running += ahead;
+            let energy = running;
+            self.before[x % RING] = *h * *h;
             if x >= ENERGY_REACH {
-                self.energy = (self.energy - self.before[behind]).max(0.0);
+                let behind = self.before[(x + RING - ENERGY_REACH) % RING];
+                running = at_least_0(running - behind);
             }
-            let noise = *w * *w * self.recipe.noise.variance(self.value(c)) * threshold;
+            let noise = *w * *w * noise_of.variance(f32::from(c) * self.per_count) * threshold;
             let gain = if energy > 2.0 * noise {
                 1.0 - noise / energy
             } else {
@@ -335,6 +342,7 @@ impl Build {
             *h *= gain;
             *w *= gain;
         }
+        self.energy = running;
     }
 
     fn balance(&mut self, span: Range<usize>, mean: &[u16], w: &[f32], h: &[f32]) {
@@ -360,18 +368,20 @@ impl Build {
     fn orthogonalise(&mut self, span: Range<usize>, mean: &[u16], w: &[f32], h: &mut [f32]) {
         let centre = self.centre(mean.len());
         let (alpha, beta) = self.alpha_beta;
+        let per_count = self.per_count;
+        let mut largest = self.largest.to_bits();
         let (Some(mean), Some(w), Some(h)) =
             (mean.get(span.clone()), w.get(span.clone()), h.get_mut(span))
         else {
             return;
         };
         for ((h, &w), &count) in h.iter_mut().zip(w).zip(mean) {
-            if *h != 0.0 {
-                *h -=
-                    w * (alpha + beta * (f32::from(count) / self.recipe.counts_per_value - centre));
-            }
-            self.largest = self.largest.max(h.abs());
+            let new = *h - w * (alpha + beta * (f32::from(count) * per_count - centre));
+            *h = if *h != 0.0 { new } else { *h };
+            // Bits of floats without a sign are in the order of the floats, and vectors compare them at once.
+            largest = largest.max(h.abs().to_bits());
         }
+        self.largest = f32::from_bits(largest);
     }
 
     /// h scaled to whole numbers. Each rounding error is carried on to the next pixel, which keeps the
@@ -398,16 +408,20 @@ impl Build {
         ) else {
             return;
         };
+        let most = i32::from(MAX_COEFFICIENT);
+        let (mut carry, mut excess) = (self.carry, self.excess);
         for (c, &h) in coefficients.iter_mut().zip(h) {
             *c = 0;
             if h != 0.0 {
-                let wanted = h * scale + self.carry;
-                let whole = nearest(wanted).clamp(-limit, limit);
-                self.carry = (wanted - whole).clamp(-1.0, 1.0);
-                *c = whole as i8;
-                self.excess += whole as i32;
+                // Beyond the limit by half a step at most: nothing in the way from one column to the next but this.
+                let wanted = h * scale + carry;
+                let whole = nearest(wanted);
+                carry = wanted - whole;
+                *c = (whole as i32).clamp(-most, most) as i8;
+                excess += i32::from(*c);
             }
         }
+        (self.carry, self.excess) = (carry, excess);
         for ((&c, &w), &count) in coefficients.iter().zip(w).zip(mean) {
             let c = f32::from(c);
             let variance = self.recipe.noise.variance(self.value(count));
@@ -488,6 +502,12 @@ impl Build {
         table.information = (information.to_bits() >> 16) as u16;
         table
     }
+}
+
+/// 0 for NaN.
+#[inline(always)]
+fn at_least_0(v: f32) -> f32 {
+    if v > 0.0 { v } else { 0.0 }
 }
 
 /// The nearest whole number, of two as near the even one, for |v| < 2²²: no bits are left behind the point.

@@ -113,8 +113,8 @@ impl Tracker<'_> {
                     self.follow.work = Work::Build { row, build };
                     return 0.0;
                 }
-                // Six pixels go into one.
-                let columns = columns.div_ceil(2);
+                // Many pixels go into one.
+                let columns = columns.div_ceil(4);
                 let span = *column..column.saturating_add(columns).min(width);
                 *column = span.end;
                 if let Some(mean) = s.mean.get_mut(row * width..(row + 1) * width) {

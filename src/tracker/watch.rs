@@ -15,8 +15,10 @@ use crate::{noise::LEAST_VARIANCE, pixel::Pixel, reference::RowTable};
 /// In tracking one row in this many is looked at even if it does not surprise.
 const EVERY: usize = 32;
 
-/// Columns that are looked at, about, and where a line time is short.
+/// Columns that are looked at, about: of a line that may be anywhere, of one among others that fitted, and where
+/// a line time is short.
 const COLUMNS: usize = 48;
+const COLUMNS_AMONG_FITTING: usize = 24;
 const COLUMNS_IN_A_HURRY: usize = 12;
 
 /// A search begins anew every so many pixels of one colour: where correlation converges from on a sharp
@@ -124,6 +126,7 @@ impl Tracker<'_> {
         let mut fit = self.fits(row, pixels, shift_px).then_some(shift_px);
         if fit.is_none() && self.watch.rest == 0 {
             self.watch.rest = 8;
+            self.watch.every_line = true;
             fit = self
                 .search(row, table, pixels)
                 .and_then(|near| self.correlate(row, table, &mut &*pixels, near, None).ok())
@@ -197,29 +200,37 @@ impl Tracker<'_> {
         );
         let line = pixels.get(overlap.line)?;
         let columns = match self.config.columns_per_line {
-            u16::MAX => COLUMNS,
+            u16::MAX if self.watch.every_line || self.stage != Stage::Tracking => COLUMNS,
+            u16::MAX => COLUMNS_AMONG_FITTING,
             _ => COLUMNS_IN_A_HURRY,
         };
         // What the motion carries in and out at the ends is little known.
         let from = r.margin_px + r.stride;
         let to = mean.len().checked_sub(from)?;
+        let n = to.checked_sub(from)?;
         let step = (width / columns).max(1);
+        let (left, here, right) = (
+            mean.get(from - r.stride..)?.get(..n)?,
+            mean.get(from..)?.get(..n)?,
+            mean.get(from + r.stride..)?.get(..n)?,
+        );
+        let (line, mask) = (line.get(from..)?.get(..n)?, mask.get(from..)?.get(..n)?);
         // All in counts of the reference.
         let value = 1.0 / r.counts_per_value;
         let gain = value / self.to_reference;
         let near = near / r.stride as f32;
         let saturation = r.saturation * r.counts_per_value;
         let per_count = r.noise.per_value * value;
-        let (mut power, mut slopes, mut n) = (0.0f32, 0.0f32, 0u16);
+        let (mut power, mut slopes, mut looked) = (0.0f32, 0.0f32, 0u16);
         // Not at the very edge, which a reference that was moved does not know.
-        let mut next = from + step / 2;
-        while next < to {
+        let mut next = step / 2;
+        while next < n {
             let x = next;
             next += step;
             let (Some(&left), Some(&here), Some(&right), Some(&p), Some(&mask)) = (
-                mean.get(x - r.stride),
-                mean.get(x),
-                mean.get(x + r.stride),
+                left.get(x),
+                here.get(x),
+                right.get(x),
                 line.get(x),
                 mask.get(x),
             ) else {
@@ -242,12 +253,12 @@ impl Tracker<'_> {
                 };
             power += rest * rest * weight;
             slopes += slope * slope * weight;
-            n += 1;
+            looked += 1;
         }
         let frames = f32::from(self.storage.learning.get(row)?.frames());
-        let own = 1.0 / (f32::from(n) * (1.0 + 1.0 / frames));
+        let own = 1.0 / (f32::from(looked) * (1.0 + 1.0 / frames));
         let slope_px = 0.5 * value / r.stride as f32;
-        (n >= 4).then_some(Rest {
+        (looked >= 4).then_some(Rest {
             power: power * own,
             slope_power: slopes * own * slope_px * slope_px,
         })

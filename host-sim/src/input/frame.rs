@@ -75,14 +75,7 @@ impl Frame {
 
     /// Row `row` of a part of the (turned) picture. The part must lie inside it.
     pub fn pixels(&self, part: &Rect, row: usize) -> Pixels<'_> {
-        cut(self.plane(), self.row(part, row))
-    }
-
-    /// Where this row of a part is in the plane.
-    #[inline]
-    fn row(&self, part: &Rect, row: usize) -> Range<usize> {
-        let start = (part.y + row) * self.width + part.x;
-        start..start + part.width
+        cut(self.plane(), row_of(part, self.width, row))
     }
 
     /// The lines `rows` of a part of the picture, numbered from its top. `timing` is the whole
@@ -94,14 +87,23 @@ impl Frame {
         timing: &'a Timing,
         rows: Range<usize>,
     ) -> impl Iterator<Item = Line<'a>> {
-        let plane = self.plane();
+        // Values, so that nothing is looked up or divided anew for each line.
+        let (plane, part, timing) = (self.plane(), *part, *timing);
+        let (number, start_ns, width) = (self.number, self.start_ns, self.width);
         rows.map(move |row| Line {
-            frame: self.number,
+            frame: number,
             row: row as u16,
-            start_ns: self.start_ns + timing.start_ns((part.y + row) as u16),
-            pixels: cut(plane, self.row(part, row)),
+            start_ns: start_ns + timing.start_ns((part.y + row) as u16),
+            pixels: cut(plane, row_of(&part, width, row)),
         })
     }
+}
+
+/// Where a row of a part is in a plane of this width.
+#[inline]
+fn row_of(part: &Rect, width: usize, row: usize) -> Range<usize> {
+    let start = (part.y + row) * width + part.x;
+    start..start + part.width
 }
 
 #[inline]

@@ -3,8 +3,8 @@
 use std::ops::Range;
 
 use rowtone::camera::Timing;
-use rowtone::timeline::{Curvature, Displacement};
-use rowtone::tracker::{Config, ConfigError, Outcome, Storage, Tracker};
+use rowtone::timeline::{Binner, Curvature, Displacement, Sample};
+use rowtone::tracker::{Config, ConfigError, Counts, Outcome, Storage, Tracker};
 
 use crate::failure::Failure;
 use crate::input::{Frame, Rect};
@@ -61,6 +61,17 @@ pub struct Unmeasured {
     pub disturbed: u32,
     /// Rows that came while a reference was being learned anew.
     pub learning: u32,
+}
+
+impl Unmeasured {
+    fn between(before: &Counts, after: &Counts) -> Self {
+        let count = |count: fn(&Counts) -> u64| count(after).wrapping_sub(count(before)) as u32;
+        Self {
+            no_texture: count(|c| c.no_texture) + count(|c| c.misfit),
+            disturbed: count(|c| c.disturbed),
+            learning: count(|c| c.learning),
+        }
+    }
 }
 
 impl std::ops::AddAssign for Unmeasured {
@@ -136,15 +147,28 @@ impl<'a> Engine<'a> {
 
     /// Measures every line of a frame and hands what came of it to `take`.
     pub fn measure(&mut self, frame: &Frame, mut take: impl FnMut(Displacement)) -> Unmeasured {
-        let mut unmeasured = Unmeasured::default();
+        let before = self.tracker.counts();
         for line in frame.lines(&self.part, &self.timing, self.rows.clone()) {
-            match self.tracker.push(&line) {
-                Outcome::Measured(displacement) => take(displacement),
-                Outcome::NoTexture | Outcome::Misfit => unmeasured.no_texture += 1,
-                Outcome::Disturbed => unmeasured.disturbed += 1,
-                Outcome::Learning => unmeasured.learning += 1,
+            if let Outcome::Measured(displacement) = self.tracker.push(&line) {
+                take(displacement);
             }
         }
-        unmeasured
+        Unmeasured::between(&before, &self.tracker.counts())
+    }
+
+    /// Measures every line of a frame, and hands the groups of rows that `binner` makes of them to `take`.
+    pub fn measure_into(
+        &mut self,
+        frame: &Frame,
+        binner: &mut Binner,
+        mut take: impl FnMut(Sample),
+    ) -> Unmeasured {
+        let before = self.tracker.counts();
+        for line in frame.lines(&self.part, &self.timing, self.rows.clone()) {
+            if let Some(sample) = self.tracker.push_into(&line, binner) {
+                take(sample);
+            }
+        }
+        Unmeasured::between(&before, &self.tracker.counts())
     }
 }

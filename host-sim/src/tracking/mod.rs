@@ -302,8 +302,8 @@ impl<'a> Lines<'a> {
         let (rows, samples) = (&mut shifts.rows, &mut shifts.samples);
         match (&mut self.still, &mut self.binner) {
             (None, Some(binner)) => {
-                let combine = |row| samples.extend(binner.push(row));
-                shifts.unmeasured = self.moving.measure(&frame, combine);
+                let take = |sample| samples.push(sample);
+                shifts.unmeasured = self.moving.measure_into(&frame, binner, take);
             }
             (still, binner) => {
                 shifts.unmeasured = self.moving.measure(&frame, |row| rows.push(row));
