@@ -28,7 +28,7 @@ const USUAL_RATE_HZ: f64 = 8000.0;
     the recording is removed. NPY: the same columns as 64-bit floats. Both hold what was measured and \
     nothing else.\n\n\
     WAV: a sound without gaps, 32-bit floats in px at a constant rate: blank time, lost frames and rows \
-    that could not be measured are filled by an autoregressive model and tones (Janssen; an estimate, \
+    that could not be measured are filled by tones and an autoregressive model (Janssen; an estimate, \
     good for the ear, no measurement), the mean is removed, and a Butterworth low-pass of order 6 run \
     both ways. All samples are kept until the end: some 16 bytes each, 460 MB an hour at 8000 a \
     second; a WAV file ends at 4 GiB, 37 hours at that rate."
@@ -43,7 +43,7 @@ pub struct Args {
     /// Format of the output [default: by the ending of -o, else csv]
     #[arg(long, value_enum)]
     format: Option<Format>,
-    /// WAV: how gaps are filled: ar, tones, median, linear or zero [default: ar]
+    /// WAV: how gaps are filled: ar, ar-alone, tones, median, linear or zero [default: ar]
     #[arg(long, value_name = "HOW")]
     fill: Option<Method>,
     /// WAV: corner of the low-pass, Hz; 0 for none [default: 1000]

@@ -24,7 +24,7 @@ pub struct Args {
     /// Narrow pictures and short sounds
     #[arg(long)]
     pub quick: bool,
-    /// Columns of the single tones' pictures; the thesis's camera had 1040, at four times the time
+    /// Columns of the single tones' pictures; the thesis's camera had 1040
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(48..=1040))]
     pub cols: Option<u32>,
     /// Amplitude of the single tones, px

@@ -42,9 +42,9 @@ pub struct Scale {
 impl Scale {
     /// What docs/results holds: some minutes.
     pub const USUAL: Self = Self {
-        tone_cols: 260,
+        tone_cols: 1040,
         sound_cols: 64,
-        sound_frames: 120,
+        sound_frames: 240,
     };
     /// A look at it: a minute.
     pub const QUICK: Self = Self {

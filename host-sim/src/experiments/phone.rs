@@ -31,7 +31,8 @@ pub fn run(folder: &Folder, scale: Scale) -> Result<(), Failure> {
          | --: | --- | --: | --: | --: | --: |\n",
         scale.sound_cols
     );
-    for hz in [83.0, 210.0, 437.0] {
+    // None a multiple of 30: that stands still in the picture and cannot be seen.
+    for hz in [83.0, 217.0, 437.0] {
         let tone = Tone {
             hz,
             amplitude_px: 0.3,

@@ -7,29 +7,15 @@
 use super::simple;
 use crate::linear::dot;
 
-/// How the model is made.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Model {
-    /// Samples in a block.
-    pub block: usize,
-    /// Turns.
-    pub turns: usize,
-    /// Order of the model: three times the longest gap, but at least and at most this.
-    pub orders: [usize; 2],
-}
-
-impl Default for Model {
-    fn default() -> Self {
-        Self {
-            block: 4096,
-            turns: 6,
-            orders: [2, 96],
-        }
-    }
-}
+/// Samples in a block, at least: an eighth of a second at 8 kHz, in which speech changes little.
+const BLOCK: usize = 1024;
+/// Turns.
+const TURNS: usize = 6;
+/// Order of the model: more than one pitch period of speech. Half of the known samples where they are few.
+const ORDER: usize = 192;
 
 /// Fills the missing samples.
-pub fn fill(samples: &[Option<f64>], model: Model) -> Vec<f64> {
+pub fn fill(samples: &[Option<f64>]) -> Vec<f64> {
     let mut filled = simple::linear(samples);
     let longest = simple::gaps(samples)
         .iter()
@@ -39,13 +25,15 @@ pub fn fill(samples: &[Option<f64>], model: Model) -> Vec<f64> {
     if longest == 0 {
         return filled;
     }
+    // A gap must not be most of a block.
+    let size = BLOCK.max(4 * longest);
     let mut start = 0;
     while start < samples.len() {
-        let end = (start + model.block).min(samples.len());
+        let end = (start + size).min(samples.len());
         let known: Vec<bool> = samples[start..end].iter().map(Option::is_some).collect();
         // Half a block of context on the left is done already.
-        let block = fill_block(&filled[start..end], &known, longest, model);
-        let from = if start == 0 { 0 } else { model.block / 4 };
+        let block = fill_block(&filled[start..end], &known);
+        let from = if start == 0 { 0 } else { size / 4 };
         if let Some(block) = block {
             filled[start + from.min(end - start)..end]
                 .copy_from_slice(&block[from.min(end - start)..]);
@@ -53,18 +41,18 @@ pub fn fill(samples: &[Option<f64>], model: Model) -> Vec<f64> {
         if end == samples.len() {
             break;
         }
-        start += model.block / 2;
+        start += size / 2;
     }
     filled
 }
 
 /// One block, from a first guess. `None` where there is too little to go by.
-fn fill_block(guess: &[f64], known: &[bool], longest: usize, how: Model) -> Option<Vec<f64>> {
+fn fill_block(guess: &[f64], known: &[bool]) -> Option<Vec<f64>> {
     let missing: Vec<usize> = (0..guess.len()).filter(|&i| !known[i]).collect();
-    let order = (3 * longest + 2)
-        .clamp(how.orders[0], how.orders[1])
-        .min(guess.len() / 4);
-    if missing.is_empty() || order < 2 || guess.len() - missing.len() < 2 * order {
+    let order = ORDER
+        .min(guess.len() / 4)
+        .min((guess.len() - missing.len()) / 2);
+    if missing.is_empty() || order < 2 {
         return None;
     }
     let known_count = (guess.len() - missing.len()) as f64;
@@ -74,7 +62,7 @@ fn fill_block(guess: &[f64], known: &[bool], longest: usize, how: Model) -> Opti
         .sum::<f64>()
         / known_count;
     let mut signal: Vec<f64> = guess.iter().map(|v| v - mean).collect();
-    for _ in 0..how.turns {
+    for _ in 0..TURNS {
         let model = levinson(&autocorrelation(&signal, order))?;
         // b(l) = Σ a(k) a(k + l): what the energy of the model's error makes of two samples l apart.
         let couple: Vec<f64> = (0..=order)

@@ -40,17 +40,20 @@ pub enum Method {
     Median,
     /// Autoregressive (Janssen), the strongest tones taken out first: the thesis's Algorithm 3.
     Ar,
+    /// The autoregressive model alone: better for music, worse for the steady tones of machines.
+    ArAlone,
     /// Tones alone.
     JointTones,
 }
 
 impl Method {
     /// All of them.
-    pub const ALL: [Self; 5] = [
+    pub const ALL: [Self; 6] = [
         Self::Zero,
         Self::Linear,
         Self::Median,
         Self::Ar,
+        Self::ArAlone,
         Self::JointTones,
     ];
 
@@ -61,6 +64,7 @@ impl Method {
             Self::Linear => "linear",
             Self::Median => "median",
             Self::Ar => "ar",
+            Self::ArAlone => "ar-alone",
             Self::JointTones => "tones",
         }
     }
@@ -79,7 +83,7 @@ impl FromStr for Method {
         Self::ALL
             .into_iter()
             .find(|m| m.name() == text)
-            .ok_or_else(|| "want zero, linear, median, ar or tones".to_owned())
+            .ok_or_else(|| "want zero, linear, median, ar, ar-alone or tones".to_owned())
     }
 }
 
@@ -95,6 +99,10 @@ pub fn fill(samples: &[Option<f64>], method: Method) -> Vec<f64> {
         Method::Zero => simple::zero(samples),
         Method::Linear => simple::linear(samples),
         Method::Median => simple::median(samples),
+        Method::ArAlone => {
+            let filled = ar::fill(samples);
+            pass_through(samples, |i| filled[i])
+        }
         Method::Ar => {
             // The tones last longer than a gap; the model then only has to explain what they leave.
             let base = tones::model(samples, tones::FEW);
@@ -103,7 +111,7 @@ pub fn fill(samples: &[Option<f64>], method: Method) -> Vec<f64> {
                 .zip(&base)
                 .map(|(s, b)| s.map(|s| s - b))
                 .collect();
-            let filled = ar::fill(&rest, ar::Model::default());
+            let filled = ar::fill(&rest);
             pass_through(samples, |i| base[i] + filled[i])
         }
         Method::JointTones => {

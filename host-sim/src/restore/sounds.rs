@@ -61,10 +61,28 @@ pub fn speech() -> Sound {
             name: "speech (espeak-ng)",
             samples,
         },
-        None => Sound {
-            name: "speech (synthesised vowels and hiss)",
-            samples: vowels(),
-        },
+        None => formants(),
+    }
+}
+
+/// What takes speech's place where espeak-ng is not installed.
+pub fn formants() -> Sound {
+    Sound {
+        name: "speech-like (vowels by formants, hiss)",
+        samples: vowels(),
+    }
+}
+
+/// Three seconds of a tone that rises evenly from 100 to 1000 Hz.
+pub fn ramp() -> Sound {
+    let length = 3.0;
+    let samples = (0..(RATE_HZ * length) as usize)
+        .map(|i| i as f64 / RATE_HZ)
+        .map(|t| (TAU * t * (100.0 + 450.0 * t / length)).sin())
+        .collect();
+    Sound {
+        name: "ramp from 100 to 1000 Hz",
+        samples,
     }
 }
 

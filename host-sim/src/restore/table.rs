@@ -41,10 +41,15 @@ pub fn snrs(sound: &Sound) -> Vec<(Method, Vec<f64>)> {
         .collect()
 }
 
-/// Both sounds, as Markdown.
+/// All sounds, as Markdown.
 pub fn markdown() -> String {
     let mut text = String::new();
-    for sound in [sounds::speech(), sounds::music()] {
+    for sound in [
+        sounds::speech(),
+        sounds::formants(),
+        sounds::music(),
+        sounds::ramp(),
+    ] {
         // Writing to a string cannot fail.
         let _ = writeln!(
             text,
