@@ -73,21 +73,16 @@ impl RawFormat {
         }
     }
 
-    /// Bytes of a group.
-    const fn group_bytes(self) -> usize {
-        match self {
-            Self::Raw8 => 1,
-            Self::Packed10 => 5,
-            Self::Packed12 => 3,
-            Self::Raw10 | Self::Raw12 | Self::Raw16 => 2,
-        }
-    }
-
     /// Bytes that `pixels` pixels take, a last group begun counted whole. Saturates.
+    #[inline]
     pub const fn bytes(self, pixels: usize) -> usize {
-        pixels
-            .div_ceil(self.group())
-            .saturating_mul(self.group_bytes())
+        // By constants, a division is a multiplication.
+        match self {
+            Self::Raw8 => pixels,
+            Self::Packed10 => pixels.div_ceil(4).saturating_mul(5),
+            Self::Packed12 => pixels.div_ceil(2).saturating_mul(3),
+            Self::Raw10 | Self::Raw12 | Self::Raw16 => pixels.saturating_mul(2),
+        }
     }
 
     /// The first `width` pixels of a line. 8-bit pixels stay where they are, others are unpacked into

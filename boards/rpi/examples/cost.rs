@@ -4,6 +4,9 @@
 //!
 //! The same frames go through tracker, binner and collector directly, their rows lying ready as the core wants
 //! them, and through this program's line path (frame clock, rows cut out of the frame, unpacking, light meter).
+//! `cost FORMAT core ROUNDS` and `cost FORMAT program ROUNDS` run one of the two, so many rounds of few frames: for a
+//! counter of instructions, which compares two numbers of rounds (`boards/rpi/ci/instructions.sh`).
+//!
 //! Times are the thread's own processor time, the shortest of many rounds: other programs do not count.
 
 use std::time::Duration;
@@ -57,9 +60,9 @@ fn processor_time() -> Duration {
 struct Best(Duration);
 
 impl Best {
-    fn of(frames: usize, mut round: impl FnMut()) -> Self {
+    fn of(rounds: usize, mut round: impl FnMut()) -> Self {
         let mut best = Duration::MAX;
-        for _ in 0..WORK / frames {
+        for _ in 0..rounds {
             let began = processor_time();
             round();
             best = best.min(processor_time() - began);
@@ -73,21 +76,32 @@ impl Best {
 }
 
 fn main() {
-    let wanted = std::env::args().nth(1).unwrap_or_default(); // all of them
+    let mut words = std::env::args().skip(1);
+    let wanted = words.next().unwrap_or_default(); // all of them
+    let counted_part = words.next().unwrap_or_default();
+    let counted: Option<usize> = words.next().and_then(|rounds| rounds.parse().ok());
+    // Emulators take their time.
+    let (height, learn) = match counted {
+        Some(_) => (96, "[camera]\nlearn_frames = 4\n"),
+        None => (480, "[camera]\n"),
+    };
     let scene = Scene {
         width: 640,
-        height: 480,
+        height,
         line_time_s: 20e-6,
         paced: false,
         ..Scene::default()
     };
-    let eight = Config::defaults();
-    let all =
-        Config::parse("[camera]\nfull_depth = true", "all bits").expect("a good configuration");
+    let config = |more: &str| {
+        let text = format!("{learn}{more}");
+        Config::parse(&text, "these").expect("a good configuration")
+    };
+    let (eight, all) = (config(""), config("full_depth = true"));
     let mut source = Simulated::new(scene.clone());
     let mut facts = source.facts().clone();
     let mut pictures = Vec::new();
-    for _ in 0..FRAMES[1] {
+    let drawn = FRAMES[usize::from(counted.is_none())];
+    for _ in 0..drawn {
         let lent = source.next(Duration::ZERO, &mut |frame| {
             pictures.push((frame.start_ns.unwrap_or(0), frame.bytes.to_vec()));
         });
@@ -117,8 +131,16 @@ fn main() {
         let rows = setup.part.height;
         for (count, place) in FRAMES.into_iter().zip(["cache", "memory"]) {
             let frames = &frames[..count];
-            let core = core_alone(&setup, frames).ns_a_line(count, rows);
-            let ours = whole_path(&setup, frames).ns_a_line(count, rows);
+            if let Some(rounds) = &counted {
+                match counted_part.as_str() {
+                    "core" => drop(core_alone(&setup, frames, *rounds)),
+                    _ => drop(whole_path(&setup, frames, *rounds)),
+                }
+                return;
+            }
+            let rounds = WORK / count;
+            let core = core_alone(&setup, frames, rounds).ns_a_line(count, rows);
+            let ours = whole_path(&setup, frames, rounds).ns_a_line(count, rows);
             println!(
                 "{name:22} from {place:6} core {core:.0} ns a line, with this program's part {ours:.0} ns: {:+.0} %",
                 100.0 * (ours / core - 1.0)
@@ -127,7 +149,7 @@ fn main() {
     }
 }
 
-fn core_alone(setup: &Setup, frames: &[(i64, Vec<u8>)]) -> Best {
+fn core_alone(setup: &Setup, frames: &[(i64, Vec<u8>)], rounds: usize) -> Best {
     let shape = setup.shape;
     let width = usize::from(shape.width);
     // As the core is given them in the end.
@@ -157,7 +179,7 @@ fn core_alone(setup: &Setup, frames: &[(i64, Vec<u8>)]) -> Best {
     let timing = setup.group.timing();
     let mut number = 0;
     let period = frames[1].0 - frames[0].0;
-    Best::of(frames.len(), || {
+    Best::of(rounds, || {
         for frame in 0..frames.len() {
             let start_ns = i64::from(number) * period;
             for row in 0..setup.part.height {
@@ -182,7 +204,7 @@ fn core_alone(setup: &Setup, frames: &[(i64, Vec<u8>)]) -> Best {
     })
 }
 
-fn whole_path(setup: &Setup, frames: &[(i64, Vec<u8>)]) -> Best {
+fn whole_path(setup: &Setup, frames: &[(i64, Vec<u8>)], rounds: usize) -> Best {
     let mut tracker_memory = TrackerMemory::new(setup.part.width, setup.part.height);
     let mut spectrum_memory = SpectrumMemory::new(setup.group, setup.window_frames);
     let period = frames[1].0 - frames[0].0;
@@ -190,7 +212,7 @@ fn whole_path(setup: &Setup, frames: &[(i64, Vec<u8>)]) -> Best {
     let collected = spectrum_memory.lend().collected;
     let mut lines = Lines::new(setup, clock, tracker_memory.lend(), collected).expect("good");
     let mut sequence = 0;
-    Best::of(frames.len(), || {
+    Best::of(rounds, || {
         for (_, bytes) in frames {
             let frame = Frame {
                 sequence,

@@ -60,20 +60,6 @@ impl<const PIXELS: usize, const BYTES: usize, const FIRST: usize> Groups<PIXELS,
         places
     };
 
-    /// Pixels of the whole groups in 64 bytes.
-    const IN_64: usize = 64 / BYTES * PIXELS;
-
-    /// Their places.
-    const PLACES_IN_64: [u8; 64] = {
-        let mut places = [0; 64];
-        let mut x = 0;
-        while x < Self::IN_64 {
-            places[x] = Self::place(x) as u8;
-            x += 1;
-        }
-        places
-    };
-
     /// Where pixel `x` lies.
     const fn place(x: usize) -> usize {
         x / PIXELS * BYTES + FIRST + x % PIXELS
@@ -91,13 +77,12 @@ impl<const PIXELS: usize, const BYTES: usize, const FIRST: usize> Groups<PIXELS,
         }
     }
 
-    /// The sums of some first pixels, and how many these are.
     #[inline(always)]
-    fn sums(kernel: Kernel, bytes: &[u8], coefficients: &[i8]) -> (Sums, usize) {
-        match kernel.0 {
+    fn sums(kernel: Kernel, spread: Spread, bytes: &[u8], coefficients: &[i8]) -> Sums {
+        let (sums, done) = match kernel.0 {
             // SAFETY: `fastest` made this kind after it asked for all of AVX-512 that this needs.
             #[cfg(target_arch = "x86_64")]
-            Kind::Avx512 { vbmi: true } => unsafe { Self::sums_64(bytes, coefficients) },
+            Kind::Avx512 { vbmi: true } => return unsafe { Self::sums_64(bytes, coefficients) },
             // SAFETY: `fastest` made these kinds after it asked the processor for AVX2.
             #[cfg(target_arch = "x86_64")]
             Kind::Avx2 | Kind::Avx512 { .. } => unsafe { Self::sums_32(bytes, coefficients) },
@@ -108,7 +93,16 @@ impl<const PIXELS: usize, const BYTES: usize, const FIRST: usize> Groups<PIXELS,
             #[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
             Kind::NeonDot => unsafe { Self::sums_dot(bytes, coefficients) },
             _ => (Sums::default(), 0),
+        };
+        let rest = coefficients.get(done..).unwrap_or_default();
+        if rest.is_empty() {
+            return sums;
         }
+        let pairs = spread.pixels(bytes, done).zip(rest);
+        pairs.fold(sums, |sums, (p, &h)| Sums {
+            product: sums.product + i64::from(p) * i64::from(h),
+            pixels: sums.pixels + u64::from(p),
+        })
     }
 }
 
@@ -152,22 +146,13 @@ impl Kernel {
 
     /// Sums over pixels where they lie, as many as there are coefficients; where `bytes` ends before, so do the sums.
     /// It may go on behind the line: then whole vectors can be read to the line's end. As [`Kernel::sums_u8`] else.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn sums_spread(self, spread: Spread, bytes: &[u8], coefficients: &[i8]) -> Sums {
-        let (sums, done) = match spread {
-            Spread::Packed10 => Packed10::sums(self, bytes, coefficients),
-            Spread::Packed12 => Packed12::sums(self, bytes, coefficients),
-            Spread::Words => Words::sums(self, bytes, coefficients),
-        };
-        let rest = coefficients.get(done..).unwrap_or_default();
-        if rest.is_empty() {
-            return sums;
+        match spread {
+            Spread::Packed10 => Packed10::sums(self, spread, bytes, coefficients),
+            Spread::Packed12 => Packed12::sums(self, spread, bytes, coefficients),
+            Spread::Words => Words::sums(self, spread, bytes, coefficients),
         }
-        let pairs = spread.pixels(bytes, done).zip(rest);
-        pairs.fold(sums, |sums, (p, &h)| Sums {
-            product: sums.product + i64::from(p) * i64::from(h),
-            pixels: sums.pixels + u64::from(p),
-        })
     }
 }
 
@@ -179,24 +164,14 @@ mod tests {
     extern crate std;
     use std::vec::Vec;
 
+    const BYTES: [u8; 15] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14];
+
     #[test]
     fn groups_are_those_of_the_formats() {
-        assert_eq!(Packed10::PLACES_IN_64[..6], [0, 1, 2, 3, 5, 6]);
-        assert_eq!(Packed12::PLACES_IN_64[..6], [0, 1, 3, 4, 6, 7]);
-        assert_eq!(Words::PLACES_IN_64[..4], [1, 3, 5, 7]);
-        let bytes: Vec<u8> = (0..90).collect();
-        for (spread, places) in [
-            (Spread::Packed10, &Packed10::PLACES_IN_64[..Packed10::IN_64]),
-            (Spread::Packed12, &Packed12::PLACES_IN_64[..Packed12::IN_64]),
-            (Spread::Words, &Words::PLACES_IN_64[..Words::IN_64]),
-        ] {
-            assert!(
-                spread
-                    .pixels(&bytes, 0)
-                    .take(places.len())
-                    .eq(places.iter().copied())
-            );
-        }
+        let first = |spread: Spread| spread.pixels(&BYTES, 0).take(6).collect::<Vec<_>>();
+        assert_eq!(first(Spread::Packed10), [0, 1, 2, 3, 5, 6]);
+        assert_eq!(first(Spread::Packed12), [0, 1, 3, 4, 6, 7]);
+        assert_eq!(first(Spread::Words), [1, 3, 5, 7, 9, 11]);
     }
 
     proptest! {

@@ -3,7 +3,7 @@
 use super::{Groups, STEP};
 use crate::kernel::Sums;
 use crate::kernel::x86_64::{ask_ahead_of, sum_i32, sum_i64};
-use crate::kernel::x86_64_avx512::sum;
+use crate::kernel::x86_64_avx512::{Block, sum};
 use core::arch::x86_64::*;
 
 /// Pixels a block: its sums fit 32 bits, 64·255·2¹⁶ < 2³¹.
@@ -102,62 +102,121 @@ impl<const PIXELS: usize, const BYTES: usize, const FIRST: usize> Groups<PIXELS,
         (sums, done)
     }
 
-    /// All sums of a block, and how many pixels that are. Two steps at once hide the latency of the instruction.
+    /// Pixels of a step of 64 bytes: whole groups, and a multiple of 16 as lines mostly are.
+    const STEP_64: usize = 64 / (16 / PIXELS * BYTES) * 16;
+
+    /// Their places; the last bytes of a step have none.
+    const PLACES_IN_64: [u8; 64] = {
+        let mut places = [0; 64];
+        let mut x = 0;
+        while x < Self::STEP_64 {
+            places[x] = Self::place(x) as u8;
+            x += 1;
+        }
+        places
+    };
+
+    /// Bytes of a step.
+    const BYTES_64: usize = Self::STEP_64 / PIXELS * BYTES;
+
+    /// All ones where a step has a pixel.
+    const LANES_64: [u8; 64] = {
+        let mut lanes = [0; 64];
+        let mut x = 0;
+        while x < Self::STEP_64 {
+            lanes[x] = u8::MAX;
+            x += 1;
+        }
+        lanes
+    };
+
+    /// All sums.
+    #[target_feature(enable = "avx512f,avx512bw,avx512vnni,avx512vbmi")]
+    pub(super) fn sums_64(bytes: &[u8], coefficients: &[i8]) -> Sums {
+        let mut sums = Sums::default();
+        let (mut bytes, mut coefficients) = (bytes, coefficients);
+        loop {
+            // A line is a block.
+            let now = coefficients
+                .len()
+                .min(BLOCK / Self::STEP_64 * Self::STEP_64);
+            let block = Self::block_64(bytes, &coefficients[..now]);
+            sums.product += i64::from(block.product);
+            sums.pixels += block.pixels as u64;
+            coefficients = &coefficients[now..];
+            if coefficients.is_empty() {
+                return sums;
+            }
+            bytes = bytes.get(now / PIXELS * BYTES..).unwrap_or_default();
+        }
+    }
+
+    /// Steps of a block, as far as `bytes` go. Two at once hide the latency of the additions.
     #[inline]
     #[target_feature(enable = "avx512f,avx512bw,avx512vnni,avx512vbmi")]
-    pub(super) fn sums_64(bytes: &[u8], coefficients: &[i8]) -> (Sums, usize) {
-        let step_bytes = 64 / BYTES * BYTES;
-        let n = coefficients.len().min(BLOCK);
-        // SAFETY: the array is 64 bytes long and the load needs no alignment.
-        let places = unsafe { _mm512_loadu_si512(Self::PLACES_IN_64.as_ptr().cast()) };
+    fn block_64(bytes: &[u8], coefficients: &[i8]) -> Block {
+        // SAFETY: the arrays are 64 bytes long and the loads need no alignment.
+        let (places, lanes) = unsafe {
+            (
+                _mm512_loadu_si512(Self::PLACES_IN_64.as_ptr().cast()),
+                _mm512_loadu_si512(Self::LANES_64.as_ptr().cast()),
+            )
+        };
         let (ones, zero) = (_mm512_set1_epi8(1), _mm512_setzero_si512());
         let (mut product, mut plain) = ([zero; 2], [zero; 2]);
-        let (mut at, mut done) = (0, 0);
-        let mut add = |side: usize, readable: usize, pixels: usize, at: usize, done: usize| {
-            // SAFETY: only bytes below the slices' lengths are read, as the callers have asked: what a mask leaves out is
-            // not touched.
-            let (p, h) = unsafe {
-                let from = bytes.as_ptr().add(at);
-                ask_ahead_of(from);
-                (
-                    _mm512_maskz_loadu_epi8(below(readable), from.cast()),
-                    _mm512_maskz_loadu_epi8(below(pixels), coefficients.as_ptr().add(done)),
-                )
-            };
-            let p = _mm512_maskz_permutexvar_epi8(below(pixels), places, p);
+        let mut add = |side: usize, p: __m512i, h: __m512i| {
             product[side] = _mm512_dpbusd_epi32(product[side], p, h);
             plain[side] = _mm512_dpbusd_epi32(plain[side], p, ones);
         };
-        while done + 2 * Self::IN_64 <= n && at + 2 * step_bytes <= bytes.len() {
-            add(0, step_bytes, Self::IN_64, at, done);
-            add(
-                1,
-                step_bytes,
-                Self::IN_64,
-                at + step_bytes,
-                done + Self::IN_64,
-            );
-            at += 2 * step_bytes;
-            done += 2 * Self::IN_64;
-        }
-        // The rest of the line: a whole step at most twice, and of the last one a part.
-        for side in [0, 1] {
-            let readable = (bytes.len() - at).min(step_bytes);
-            let pixels = (n - done).min(readable / BYTES * PIXELS);
-            if pixels > 0 {
-                add(side, readable, pixels, at, done);
-                at += readable;
-                done += pixels;
+        let (mut at, mut done) = (0, 0);
+        // Whole vectors are read: the last of them ends that much behind its step.
+        while at + Self::BYTES_64 + 64 <= bytes.len()
+            && done + Self::STEP_64 + 64 <= coefficients.len()
+        {
+            for side in [0, 1] {
+                // SAFETY: both vectors lie within their slices, as was just asked for the second turn, and need no
+                // alignment.
+                let (p, h) = unsafe {
+                    let from = bytes.as_ptr().add(at);
+                    ask_ahead_of(from);
+                    (
+                        _mm512_loadu_si512(from.cast()),
+                        _mm512_loadu_si512(coefficients.as_ptr().add(done).cast()),
+                    )
+                };
+                add(
+                    side,
+                    _mm512_and_si512(_mm512_permutexvar_epi8(places, p), lanes),
+                    h,
+                );
+                at += Self::BYTES_64;
+                done += Self::STEP_64;
             }
         }
-        let block = sum(
+        // The rest: what no mask lets through is not read and counts as 0.
+        while done < coefficients.len() && at < bytes.len() {
+            let readable = (bytes.len() - at).min(64);
+            let pixels = (coefficients.len() - done)
+                .min(Self::STEP_64)
+                .min(readable / BYTES * PIXELS);
+            // SAFETY: only bytes below the slices' lengths are let through.
+            let (p, h) = unsafe {
+                (
+                    _mm512_maskz_loadu_epi8(below(readable), bytes.as_ptr().add(at).cast()),
+                    _mm512_maskz_loadu_epi8(below(pixels), coefficients.as_ptr().add(done)),
+                )
+            };
+            add(
+                0,
+                _mm512_maskz_permutexvar_epi8(below(pixels), places, p),
+                h,
+            );
+            at += Self::BYTES_64;
+            done += pixels;
+        }
+        sum(
             _mm512_add_epi32(product[0], product[1]),
             _mm512_add_epi32(plain[0], plain[1]),
-        );
-        let sums = Sums {
-            product: block.product.into(),
-            pixels: block.pixels as u64,
-        };
-        (sums, done)
+        )
     }
 }
