@@ -212,6 +212,7 @@ mod tests {
             let score = scores.iter().find(|s| s.method == name).unwrap();
             assert!(score.hz_error.is_some_and(|e| e.abs() < 0.5), "{score:?}");
         }
-        assert!(scores[0].noise_over_bound < 1.25, "{:?}", scores[0]);
+        // A reference of eight frames has noise of its own.
+        assert!(scores[0].noise_over_bound < 1.5, "{:?}", scores[0]);
     }
 }
