@@ -23,8 +23,10 @@ pub(super) enum Unfound {
 const TURNS: u8 = 6;
 const TURNS_IN_A_HURRY: u8 = 2;
 
-/// Beyond this the row's polynomial is left for the next whole shift, px.
+/// Beyond this the row's polynomial is left for the next whole shift, px. While learning, a row of little but noise that is
+/// moved on too readily aligns its noise and takes it for texture.
 pub(super) const NEAR_PX: f32 = 0.55;
+pub(super) const NEAR_WHILE_LEARNING_PX: f32 = 0.7;
 
 impl Tracker<'_> {
     /// Σ h·p and Σ p of a whole line against its whole row: all that it takes where the picture has moved by

@@ -1,5 +1,6 @@
 //! Learning the reference, in two rounds of frames.
 
+use super::correlate::{NEAR_PX, NEAR_WHILE_LEARNING_PX};
 use super::{Left, Place, Stage, Tracker, follow::Follow, predict::Prediction, watch::Watch};
 use crate::{
     align::{self, Averaging},
@@ -61,6 +62,7 @@ impl Tracker<'_> {
         self.to_reference = 1.0;
         self.prediction = Prediction::default();
         self.curvature = Curvature::default();
+        self.near_px = NEAR_WHILE_LEARNING_PX * f32::from(self.config.stride);
         self.blur.relearn();
         self.meter = NoiseMeter::default();
         self.watch = Watch::default();
@@ -99,6 +101,7 @@ impl Tracker<'_> {
                 self.even_light();
                 self.build_all();
                 self.stage = Stage::Tracking;
+                self.near_px = NEAR_PX * f32::from(self.config.stride);
             }
             Stage::Tracking => {}
         }

@@ -37,7 +37,7 @@ use crate::{
     timeline::{Binner, Curvature, Displacement, RowShift, Sample},
 };
 use blur::Blur;
-use correlate::NEAR_PX;
+use correlate::NEAR_WHILE_LEARNING_PX;
 use flicker::Flicker;
 use follow::Follow;
 use line::{Left, Place, Quiet};
@@ -102,7 +102,7 @@ pub struct Tracker<'a> {
     beside: bool,
     /// The row from which on the next line is looked at.
     attend: usize,
-    /// Half the pixels from one to the next of the same colour, and [`NEAR_PX`] of them.
+    /// Half the pixels from one to the next of the same colour, and `NEAR_PX` of them.
     half_step_px: f32,
     near_px: f32,
     counts: Counts,
@@ -147,7 +147,7 @@ impl<'a> Tracker<'a> {
             beside: false,
             attend: 0,
             half_step_px: 0.5 * f32::from(config.stride),
-            near_px: NEAR_PX * f32::from(config.stride),
+            near_px: NEAR_WHILE_LEARNING_PX * f32::from(config.stride),
             counts: Counts::default(),
         };
         tracker.relearn();
