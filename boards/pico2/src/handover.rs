@@ -4,7 +4,7 @@
 //! done, the line in it is dropped and counted, and the buffer is filled again: a line that comes while the
 //! last is still being worked on is counted, not waited for.
 
-use crate::capture::{LINE_PIXELS, LINE_WORDS, missing_samples};
+use crate::capture::{LINE_WORDS, missing_samples};
 use crate::frames::Place;
 use core::sync::atomic::{AtomicU32, Ordering};
 use embassy_sync::blocking_mutex::raw::RawMutex;
@@ -30,19 +30,15 @@ impl LineBuffer {
         },
     };
 
-    /// Its pixels, or how many samples of them are missing.
+    /// Its pixels where they lie, or how many samples of them are missing.
     ///
     /// # Errors
     /// The number of missing samples: such a line is not measured.
-    pub fn pixels(&self, bytes: &mut [u8; LINE_PIXELS]) -> Result<(), u32> {
+    pub fn pixels(&self) -> Result<&[u8], u32> {
         let [words @ .., last] = &self.words;
         match missing_samples(*last) {
-            0 => {
-                for (to, word) in bytes.chunks_exact_mut(4).zip(words) {
-                    to.copy_from_slice(&word.to_le_bytes());
-                }
-                Ok(())
-            }
+            // The first pixel in the lowest byte, which both cores and every host have first in memory.
+            0 => Ok(bytemuck::cast_slice(words)),
             missing => Err(missing),
         }
     }
@@ -146,6 +142,7 @@ impl<'a, M: RawMutex> Taker<'a, M> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::capture::LINE_PIXELS;
     use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
     use embassy_sync::zerocopy_channel::Channel;
 
@@ -221,13 +218,13 @@ mod tests {
         line.words[0] = u32::from_le_bytes([1, 2, 3, 4]);
         line.words[LINE_WORDS - 2] = u32::from_le_bytes([5, 6, 7, 8]);
         line.words[LINE_WORDS - 1] = u32::MAX;
-        let mut bytes = [0; LINE_PIXELS];
-        assert_eq!(line.pixels(&mut bytes), Ok(()));
+        let bytes = line.pixels().unwrap();
+        assert_eq!(bytes.len(), LINE_PIXELS);
         assert_eq!(
             (&bytes[..4], &bytes[LINE_PIXELS - 4..]),
             (&[1, 2, 3, 4][..], &[5, 6, 7, 8][..])
         );
         line.words[LINE_WORDS - 1] = 6;
-        assert_eq!(line.pixels(&mut bytes), Err(7));
+        assert_eq!(line.pixels(), Err(7));
     }
 }

@@ -9,7 +9,6 @@ use rowtone::camera::{Line, Pixels};
 use rowtone::settings::Region;
 use rowtone::timeline::{Binner, Sample};
 use rowtone::tracker::{Stage, Tracker};
-use rowtone_pico2::capture::LINE_PIXELS;
 use rowtone_pico2::handover::{LineBuffer, Taker, count};
 use rowtone_pico2::plan::Plan;
 
@@ -83,12 +82,11 @@ fn measure(
         .row
         .checked_sub(y)
         .filter(|&row| row < height)?;
-    let mut bytes = [0; LINE_PIXELS];
-    if buffer.pixels(&mut bytes).is_err() {
+    let Ok(pixels) = buffer.pixels() else {
         count(&LINE_LOSSES.short);
         return None;
-    }
-    let pixels = bytes.get(usize::from(x)..)?.get(..usize::from(width))?;
+    };
+    let pixels = pixels.get(usize::from(x)..)?.get(..usize::from(width))?;
     let start_ns = buffer
         .place
         .frame_start_ns

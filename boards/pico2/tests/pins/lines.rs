@@ -83,9 +83,8 @@ impl Board {
 
     fn take(&mut self, receiver: &mut Receiver<'_, NoopRawMutex, LineBuffer>) {
         let line = receiver.try_receive().expect("it was handed over");
-        let mut bytes = [0; LINE_PIXELS];
-        match line.pixels(&mut bytes) {
-            Ok(()) => self
+        match line.pixels() {
+            Ok(bytes) => self
                 .taken
                 .push((line.place.frame, line.place.row, bytes.to_vec())),
             Err(missing) => self.short.push((line.place.row, missing)),
