@@ -14,5 +14,6 @@ pub mod handover;
 pub mod health;
 pub mod hm01b0;
 pub mod led;
+pub mod losses;
 pub mod memory;
 pub mod plan;

@@ -16,6 +16,8 @@ pub const FRAMES: usize = 96;
 pub const SLOTS: usize = 96;
 /// Frequencies up to this one are sampled well, where the memory allows.
 pub const MAX_HZ: f32 = 2000.0;
+/// Passes over a window's samples: so many take less than a hop of 0.5 s, whatever is in it (README.md).
+pub const MAX_PASSES: u32 = 36;
 /// Columns of a row's coefficients that are built anew beside a line, when a row's are: about as long as the
 /// line's own inner product.
 pub const COLUMNS_PER_LINE: u16 = 16;

@@ -3,9 +3,9 @@
 use crate::capture::LINE_PIXELS;
 use crate::clock::FrameClock;
 use crate::hm01b0;
-use crate::memory::{COLUMNS_PER_LINE, FRAMES, rows_per_sample};
+use crate::memory::{COLUMNS_PER_LINE, FRAMES, MAX_PASSES, rows_per_sample};
 use rowtone::camera::Timing;
-use rowtone::settings::{Limits, Region, Settings};
+use rowtone::settings::{Limits, Region, Settings, Wire};
 use rowtone::spectrum;
 use rowtone::timeline::Group;
 use rowtone::tracker;
@@ -20,6 +20,20 @@ pub const LIMITS: Limits = Limits {
     min_width: 32,
     // So that a window of the fastest camera set-up (64 frames a second) fits the memory.
     max_window_s: FRAMES as f32 / 64.0,
+};
+
+/// How it is set when it comes from the factory: [`Settings::default`], as a constant.
+pub const DEFAULTS: Settings = Settings {
+    window_s: 1.0,
+    hop_s: 0.5,
+    max_peaks: 8,
+    false_alarm: 1e-3,
+    um_per_px: None,
+    roi: None,
+    min_hz: None,
+    max_hz: None,
+    wire: Wire::Text,
+    unit: 1,
 };
 
 /// The whole picture.
@@ -88,6 +102,7 @@ pub fn spectrum_config(settings: &Settings) -> spectrum::Config {
         max_hz: settings.max_hz,
         max_peaks: settings.max_peaks.into(),
         false_alarm: settings.false_alarm,
+        max_passes: MAX_PASSES,
         um_per_px: settings.um_per_px,
         ..spectrum::Config::default()
     }
@@ -108,12 +123,13 @@ mod tests {
     #[test]
     fn default_settings_fit_the_memory() {
         let camera = hm01b0::Config::QVGA_8BIT;
-        let plan = Plan::new(&Settings::default(), &camera, &clock(17_472_000)).unwrap();
+        let plan = Plan::new(&DEFAULTS, &camera, &clock(17_472_000)).unwrap();
         assert_eq!(plan.timing.line_time_ps(), 67_200_000);
         assert_eq!(plan.timing.exposure_ns(), 537_600);
         assert_eq!(plan.spectrum.check(), Ok(()));
-        assert_eq!(Settings::default().check(&LIMITS), Ok(()));
+        assert_eq!(DEFAULTS.check(&LIMITS), Ok(()));
         assert_eq!(plan.tracker().width, 320);
+        assert_eq!(DEFAULTS, Settings::default());
     }
 
     #[test]
@@ -127,7 +143,7 @@ mod tests {
         let settings = Settings {
             window_s: LIMITS.max_window_s,
             roi: Some(roi),
-            ..Settings::default()
+            ..DEFAULTS
         };
         assert_eq!(settings.check(&LIMITS), Ok(()));
         let plan = Plan::new(&settings, &hm01b0::Config::QVGA_8BIT, &clock(17_472_000)).unwrap();
@@ -145,11 +161,7 @@ mod tests {
     fn an_absurd_clock_is_no_plan() {
         let camera = hm01b0::Config::QVGA_8BIT;
         assert_eq!(
-            Plan::new(
-                &Settings::default(),
-                &camera,
-                &FrameClock::new(i64::MAX / 512)
-            ),
+            Plan::new(&DEFAULTS, &camera, &FrameClock::new(i64::MAX / 512)),
             None
         );
     }

@@ -10,11 +10,10 @@ use heapless::spsc::{Consumer, Producer, Queue};
 use rowtone::analyzer::{Collector, Reporter};
 use rowtone::camera::Timing;
 use rowtone::report::Report;
-use rowtone::settings::Settings;
 use rowtone::timeline::{Group, Sample};
 use rowtone_pico2::handover::count;
 use rowtone_pico2::memory::SpectrumMemory;
-use rowtone_pico2::plan::{ROWS, spectrum_config};
+use rowtone_pico2::plan::{DEFAULTS, ROWS, spectrum_config};
 use static_cell::StaticCell;
 
 /// Samples on their way: core 1's interrupt takes them at once, unless it is sending or copying a window.
@@ -47,7 +46,7 @@ pub(crate) fn set_up(
     PRODUCER.lock(|p| p.replace(Some(producer)));
     CONSUMER.lock(|c| c.replace(Some(consumer)));
     let storage = memory.lend();
-    let config = spectrum_config(&Settings::default());
+    let config = spectrum_config(&DEFAULTS);
     // Constants that fit, as a test of the plan shows for the defaults.
     let group = Timing::new(67_200_000, 0, ROWS)
         .ok()

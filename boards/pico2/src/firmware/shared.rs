@@ -1,7 +1,7 @@
 //! What the cores and interrupts share, each with one writer.
 
 use core::cell::RefCell;
-use core::sync::atomic::{AtomicBool, AtomicU32};
+use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use embassy_sync::blocking_mutex::{Mutex, raw::CriticalSectionRawMutex};
 use embassy_sync::signal::Signal;
 use rowtone::settings::Settings;
@@ -9,6 +9,7 @@ use rowtone_pico2::frames::Frames;
 use rowtone_pico2::handover::LineLosses;
 use rowtone_pico2::health::State;
 use rowtone_pico2::hm01b0::{Config, ROWS};
+use rowtone_pico2::losses::Losses;
 use rowtone_pico2::plan::Plan;
 
 /// Works across cores: embassy-rp's critical section takes a hardware spinlock.
@@ -51,3 +52,15 @@ pub(crate) static MEASURING: AtomicBool = AtomicBool::new(false);
 pub(crate) static CAMERA_STATE: Signal<M, State> = Signal::new();
 /// Core 1 is alive; it counts.
 pub(crate) static CORE1_ALIVE: AtomicU32 = AtomicU32::new(0);
+
+/// What was lost since the start.
+pub(crate) fn losses() -> Losses {
+    let read = |counter: &AtomicU32| counter.load(Ordering::Relaxed);
+    Losses {
+        late: read(&LINE_LOSSES.overruns),
+        short: read(&LINE_LOSSES.short),
+        stalled: read(&LINE_LOSSES.stalled),
+        samples: read(&DROPPED_SAMPLES),
+        windows: read(&DROPPED_WINDOWS),
+    }
+}

@@ -2,7 +2,7 @@
 
 use super::compute::REPORTS;
 use super::keep::Remote;
-use super::shared::{CAMERA_STATE, CORE1_ALIVE, PLAN_ANEW, SETTINGS};
+use super::shared::{CAMERA_STATE, CORE1_ALIVE, PLAN_ANEW, SETTINGS, losses};
 use core::fmt::Write as _;
 use core::sync::atomic::Ordering;
 use embassy_futures::select::{Either4, select4};
@@ -14,9 +14,10 @@ use rowtone::link::Link;
 use rowtone::outbox::Outbox;
 use rowtone::report::Report;
 use rowtone::settings::store::Started;
-use rowtone::settings::{Board, Console, Settings, Wire};
+use rowtone::settings::{Board, Console, Wire};
 use rowtone_pico2::boot::Boot;
-use rowtone_pico2::plan::LIMITS;
+use rowtone_pico2::losses::Losses;
+use rowtone_pico2::plan::{DEFAULTS, LIMITS};
 use static_cell::StaticCell;
 
 /// Speed of the serial line.
@@ -30,19 +31,6 @@ const BOARD: Board = Board {
     version: [0, 1, 0],
     limits: LIMITS,
     defaults: DEFAULTS,
-};
-
-const DEFAULTS: Settings = Settings {
-    window_s: 1.0,
-    hop_s: 0.5,
-    max_peaks: 8,
-    false_alarm: 1e-3,
-    um_per_px: None,
-    roi: None,
-    min_hz: None,
-    max_hz: None,
-    wire: Wire::Text,
-    unit: 1,
 };
 
 /// Says reports, answers commands.
@@ -68,6 +56,7 @@ pub(crate) async fn talk(uart: BufferedUart, boot: Boot, started: Started) {
     .await;
     link.announce(now_us());
     let mut byte = [0];
+    let mut said = Losses::default();
     loop {
         CORE1_ALIVE.fetch_add(1, Ordering::Relaxed);
         // No more than fits the UART's buffer, so that this never waits while samples do.
@@ -93,7 +82,14 @@ pub(crate) async fn talk(uart: BufferedUart, boot: Boot, started: Started) {
             }
             // Noise on the line: what was garbled fails its check or is no command.
             Either4::First(_) => {}
-            Either4::Second(report) => link.push(report),
+            Either4::Second(report) => {
+                link.push(report);
+                let losses = losses();
+                if losses != said {
+                    said = losses;
+                    note(&mut out, &link, format_args!("{losses}")).await;
+                }
+            }
             Either4::Third(state) => note(&mut out, &link, format_args!("{state}")).await,
             Either4::Fourth(()) => {}
         }
