@@ -23,6 +23,12 @@ fi
 cargo test --locked -p rowtone-pico2 -p rowtone-mps2-an505
 cargo clippy --locked -p rowtone-pico2 -p rowtone-mps2-an505 --all-targets -- -D warnings
 
+# The other camera modules: one data pin, and four. The last build is the one with eight.
+for bus in bus-1bit bus-4bit; do
+    tools/embedded-cargo.sh build --locked --profile firmware -p rowtone-pico2 --bin rowtone-pico2 --features "$bus"
+    boards/budget.sh "pico2 $bus" "$(tools/embedded-cargo.sh --where firmware rowtone-pico2)"
+done
+
 for package in rowtone-pico2 rowtone-mps2-an505; do
     tools/embedded-cargo.sh build --locked --profile firmware -p "$package" --bin "$package"
 done

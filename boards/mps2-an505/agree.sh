@@ -4,7 +4,9 @@
 #
 #   boards/mps2-an505/agree.sh [CLIP.y4m --line-time-us T [--exposure-us T] [--fps F] [--window S]]
 #
-# Without a clip the simulator makes one.
+# Without a clip the simulator makes one: lines every 66 us, five tones, 4095 samples a window; and one
+# of eight tones. Then the figures must also keep within what a line and a hop of 0.5 s have time for: 150 MHz, 1.6
+# cycles an instruction.
 set -euo pipefail
 root=$(cd "$(dirname "$0")/../.." && pwd)
 rowtone() { (cd "$root" && cargo run --quiet --release -p host-sim -- "$@"); }
@@ -12,9 +14,15 @@ rowtone() { (cd "$root" && cargo run --quiet --release -p host-sim -- "$@"); }
 if [ $# = 0 ]; then
     folder=$(mktemp -d)
     trap 'rm -rf "$folder"' EXIT
-    rowtone simulate -o "$folder/clip.y4m" --size 256x240 --fps 57 --line-time-us 67 --exposure-us 500 \
-        --seconds 1.5 --seed 7 --tone 31.3:0.3 --tone 62.6:0.1 --tone 124.1:0.05 --tone 201.7:0.04 --tone 333.3:0.02 >&2
-    set -- "$folder/clip.y4m" --line-time-us 67 --exposure-us 500
+    # 63 samples of four rows a frame, 65 frames a window.
+    simulate() { # NAME TONE...
+        rowtone simulate -o "$folder/$1" --size 256x252 --fps 59 --line-time-us 66 --exposure-us 500 --seconds 1.8 --seed 7 \
+            "${@:2}" --tone 31.3:0.3 --tone 62.6:0.1 --tone 124.1:0.05 --tone 201.7:0.04 --tone 333.3:0.02 >&2
+    }
+    simulate five.y4m
+    simulate eight.y4m --tone 410.9:0.05 --tone 525.1:0.03 --tone 611.7:0.03
+    set -- "$folder/five.y4m" --line-time-us 66 --exposure-us 500 --window 1.1016
+    max_line=3000 max_spectrum=46875000
 fi
 clip=$(realpath "$1")
 shift
@@ -38,3 +46,16 @@ paste -d' ' <(echo "$host_peaks") <(echo "$board_peaks") | awk '
     }
     END { exit bad || NR == 0 }'
 echo "the board agrees with the host"
+
+within() { # FIGURES NAME LIMIT
+    local value
+    value=$(grep -oE "(^| )$2=[0-9]+" <<<"$1" | cut -d= -f2)
+    [ "$value" -le "$3" ] || { echo "agree.sh: $2=$value is above $3" >&2; exit 1; }
+}
+if [ -n "${max_line:-}" ]; then
+    within "$board" max_insn_per_line "$max_line"
+    within "$board" max_insn_per_spectrum "$max_spectrum"
+    eight=$("$root/boards/mps2-an505/run.sh" "$folder/eight.y4m" "${@}" --icount | grep '^insn_per_line=')
+    echo "eight tones: $eight"
+    within "$eight" max_insn_per_spectrum "$max_spectrum"
+fi

@@ -13,7 +13,8 @@ use rowtone::wire::{Message, text};
 use rowtone_mps2_an505::args::Args;
 use rowtone_mps2_an505::board::{
     counter::{Counter, Start},
-    host, stack,
+    host,
+    stack::{self, Mark},
     uart::Uart,
 };
 use rowtone_mps2_an505::figures::Count;
@@ -58,6 +59,7 @@ fn run(args: &Args, uart: &mut Uart) -> Result<(), Failure> {
     let config = spectrum::Config {
         window_ns,
         hop_ns: window_ns / 2,
+        max_passes: rowtone_pico2::memory::MAX_PASSES,
         ..spectrum::Config::default()
     };
     let mut board = Board {
@@ -70,6 +72,9 @@ fn run(args: &Args, uart: &mut Uart) -> Result<(), Failure> {
         timing,
         per_line: Count::default(),
         per_spectrum: Count::default(),
+        spectrum_stack_bytes: 0,
+        encode_stack_bytes: 0,
+        stack_bytes: 0,
     };
     board.learn()?;
     board.measure()?;
@@ -98,6 +103,11 @@ struct Board<'a> {
     timing: Timing,
     per_line: Count,
     per_spectrum: Count,
+    /// Stack of computing a window, and of writing its report.
+    spectrum_stack_bytes: usize,
+    encode_stack_bytes: usize,
+    /// Most of it in use, in all.
+    stack_bytes: usize,
 }
 
 impl Board<'_> {
@@ -131,43 +141,58 @@ impl Board<'_> {
         }
         let last = self.binner.finish();
         self.collect(last);
+        let mark = self.mark();
         let start = self.counter.as_ref().map(Counter::start);
         let report = self.analyzer.finish();
-        self.count_and_say(start, report);
+        self.count_and_say(mark, start, report);
         Ok(())
     }
 
     fn collect(&mut self, sample: Option<Sample>) {
         if sample.is_some_and(|sample| self.analyzer.push(sample)) {
+            let mark = self.mark();
             let start = self.counter.as_ref().map(Counter::start);
             let report = self.analyzer.report();
-            self.count_and_say(start, report);
+            self.count_and_say(mark, start, report);
         }
     }
 
-    fn count_and_say(&mut self, start: Option<Start>, report: Option<Report>) {
+    /// From here on the stack is measured anew.
+    fn mark(&mut self) -> Mark {
+        let mark = Mark::new();
+        self.stack_bytes = self.stack_bytes.max(mark.before_bytes());
+        mark
+    }
+
+    fn count_and_say(&mut self, mark: Mark, start: Option<Start>, report: Option<Report>) {
         let Some(report) = report else { return };
         if let (Some(counter), Some(start)) = (&self.counter, start) {
             self.per_spectrum.add(counter.instructions(start));
         }
+        self.spectrum_stack_bytes = self.spectrum_stack_bytes.max(mark.since_bytes());
+        let mark = self.mark();
         if let Err(e) = text::encode(&Message::Report { session: 1, report }, self.uart) {
             let _ = writeln!(self.uart, "report: {e:?}");
         }
+        self.encode_stack_bytes = self.encode_stack_bytes.max(mark.since_bytes());
     }
 
     fn say_figures(&mut self) {
         let _ = writeln!(
             self.uart,
             "insn_per_line={} max_insn_per_line={} insn_per_spectrum={} stack_max_bytes={} ram_static_bytes={} \
-             flash_bytes={} min_insn_per_line={} max_insn_per_spectrum={}",
+             flash_bytes={} min_insn_per_line={} max_insn_per_spectrum={} \
+             spectrum_stack_bytes={} encode_stack_bytes={}",
             self.per_line.mean(),
             self.per_line.max(),
             self.per_spectrum.mean(),
-            stack::used_max_bytes(),
+            self.stack_bytes.max(stack::used_max_bytes()),
             stack::static_ram_bytes(),
             stack::flash_bytes(),
             self.per_line.min(),
             self.per_spectrum.max(),
+            self.spectrum_stack_bytes,
+            self.encode_stack_bytes,
         );
     }
 }

@@ -3,6 +3,15 @@
 //! Their inner product is taken where they lie ([`Kernel::sums_spread`]); where a line is needed as a whole
 //! they are brought together first ([`Kernel::gather`]). Both are a shuffle that picks the wanted bytes of a vector.
 
+// Plain Rust needs none of the shuffles.
+#![cfg_attr(
+    not(any(
+        target_arch = "x86_64",
+        all(target_arch = "aarch64", target_feature = "neon")
+    )),
+    allow(unused_imports, unused_variables)
+)]
+
 #[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
 mod aarch64;
 #[cfg(target_arch = "x86_64")]
