@@ -104,7 +104,6 @@ pub fn spectrum_config(settings: &Settings) -> spectrum::Config {
         false_alarm: settings.false_alarm,
         max_passes: MAX_PASSES,
         um_per_px: settings.um_per_px,
-        ..spectrum::Config::default()
     }
 }
 
