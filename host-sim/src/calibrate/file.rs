@@ -91,9 +91,16 @@ pub enum FileError {
     /// It cannot be read.
     Read(std::io::Error),
     /// It is not TOML, or not this TOML.
-    Parse(String),
+    Parse {
+        /// Which line; `None` where something is missing.
+        line: Option<usize>,
+        /// What is wrong.
+        what: String,
+    },
     /// A figure is impossible.
     Value {
+        /// Which line, where a file says so.
+        line: Option<usize>,
         /// Which.
         name: &'static str,
         /// What it was.
@@ -105,17 +112,33 @@ impl fmt::Display for FileError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Read(error) => write!(f, "cannot be read: {error}"),
-            Self::Parse(text) => write!(
+            Self::Parse { line, what } => write!(
                 f,
-                "not a calibration file: {}",
-                text.trim().replace('\n', " ")
+                "{}{what}: correct it, or make the file with `rowtone calibrate -o FILE`",
+                Line(*line)
             ),
-            Self::Value { name, value } => write!(
+            Self::Value { line, name, value } => write!(
                 f,
-                "{name} = {value} is impossible: measure again or correct the file"
+                "{}{name} = {value} is impossible: correct it, or measure again with `rowtone calibrate -o FILE`",
+                Line(*line)
             ),
         }
     }
+}
+
+/// `line N: `, or nothing.
+struct Line(Option<usize>);
+
+impl fmt::Display for Line {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.map_or(Ok(()), |line| write!(f, "line {line}: "))
+    }
+}
+
+/// The line that begins with `key`, from 1.
+fn line_of(text: &str, key: &str) -> Option<usize> {
+    let is_it = |line: &str| line.split('=').next().is_some_and(|k| k.trim() == key);
+    text.lines().position(is_it).map(|n| n + 1)
 }
 
 impl std::error::Error for FileError {}
@@ -126,9 +149,29 @@ impl Calibration {
     /// # Errors
     /// [`FileError::Parse`], or [`FileError::Value`] for figures that no camera has.
     pub fn from_toml(text: &str) -> Result<Self, FileError> {
-        let calibration: Self =
-            toml::from_str(text).map_err(|e| FileError::Parse(e.to_string()))?;
-        calibration.timing()?;
+        let calibration: Self = toml::from_str(text).map_err(|e| {
+            let missing = e.message().starts_with("missing field");
+            let at = e.span().filter(|_| !missing);
+            FileError::Parse {
+                line: at.map(|span| text[..span.start.min(text.len())].matches('\n').count() + 1),
+                // Without the list of all keys there are.
+                what: e
+                    .message()
+                    .replace('\n', " ")
+                    .split(", expected one of")
+                    .next()
+                    .unwrap_or_default()
+                    .to_owned(),
+            }
+        })?;
+        calibration.timing().map_err(|error| match error {
+            FileError::Value { name, value, .. } => FileError::Value {
+                line: line_of(text, name),
+                name,
+                value,
+            },
+            other => other,
+        })?;
         Ok(calibration)
     }
 
@@ -149,20 +192,32 @@ impl Calibration {
     /// The core's own [`rowtone::camera::Timing`]. A missing exposure counts as 0.
     ///
     /// # Errors
-    /// [`FileError::Value`] where a figure does not fit: line time up to 4.29 ms, exposure up to 4.29 s, rows up
-    /// to 65 535.
+    /// [`FileError::Value`] where a figure does not fit: line time above 0 and up to 4.29 ms, exposure up to 4.29 s, rows
+    /// 1 to 65 535.
     pub fn timing(&self) -> Result<rowtone::camera::Timing, FileError> {
         let checked = |name, value: f64, scale: f64| {
             let scaled = (value * scale).round();
             if (0.0..=f64::from(u32::MAX)).contains(&scaled) {
                 Ok(scaled as u32)
             } else {
-                Err(FileError::Value { name, value })
+                Err(FileError::Value {
+                    line: None,
+                    name,
+                    value,
+                })
             }
         };
         let line_time_ps = checked("line_time_s", self.line_time_s, 1e12)?;
         let exposure_ns = checked("exposure_s", self.exposure_s.unwrap_or(0.0), 1e9)?;
+        if line_time_ps == 0 {
+            return Err(FileError::Value {
+                line: None,
+                name: "line_time_s",
+                value: self.line_time_s,
+            });
+        }
         let impossible_rows = || FileError::Value {
+            line: None,
             name: "rows",
             value: f64::from(self.rows),
         };
@@ -193,18 +248,44 @@ mod tests {
         );
     }
 
+    /// One line each, which names the key, the line, and what to do.
     #[test]
     fn nonsense_is_refused() {
-        for text in [
-            "",
-            "rows = 0\nline_time_s = 1e-5",
-            "rows = 70000\nline_time_s = 1e-5",
-            "rows = 100\nline_time_s = -1e-5",
-            "rows = 100\nline_time_s = nan",
-            "rows = 100\nline_time_s = 1.0",
-            "rows = 100\nline_time_s = 1e-5\nspeed = 3",
+        for (text, key, line) in [
+            ("", "rows", None),
+            ("rows = 100", "line_time_s", None),
+            ("rows = 0\nline_time_s = 1e-5", "rows", Some(1)),
+            ("rows = 70000\nline_time_s = 1e-5", "rows", Some(1)),
+            ("rows = \"many\"\nline_time_s = 1e-5", "", Some(1)),
+            ("rows = 100\nline_time_s = -1e-5", "line_time_s", Some(2)),
+            ("rows = 100\nline_time_s = 0.0", "line_time_s", Some(2)),
+            ("rows = 100\nline_time_s = nan", "line_time_s", Some(2)),
+            ("rows = 100\n\nline_time_s = 1.0", "line_time_s", Some(3)),
+            (
+                "rows = 100\nline_time_s = 1e-5\nspeed = 3",
+                "speed",
+                Some(3),
+            ),
+            (
+                "rows = 100\nline_time_s = 1e-5\nexposure_s = -1.0",
+                "exposure_s",
+                Some(3),
+            ),
+            ("rows = 100\nline_time_s 1e-5", "", Some(2)),
         ] {
-            assert!(Calibration::from_toml(text).is_err(), "{text}");
+            let says = Calibration::from_toml(text).unwrap_err().to_string();
+            assert!(says.contains(key), "{text:?}: {says}");
+            assert!(
+                !says.contains('\n') && says.contains("rowtone calibrate"),
+                "{says}"
+            );
+            let named = line.map_or(!says.contains("line "), |n| {
+                says.contains(&format!("line {n}: "))
+            });
+            assert!(
+                named || line.is_none() && says.contains("line_time_s"),
+                "{text:?}: {says}"
+            );
         }
     }
 }

@@ -17,8 +17,19 @@ pub(super) fn text(c: &Calibration) -> String {
             with_sd(c.periods_per_frame, c.periods_per_frame_sd, 1.0)
         ),
         format!(
-            "read-out           {} ms",
-            with_sd(c.readout_s, c.readout_s_sd, 1e3)
+            "read-out           {} ms ({} line times)",
+            with_sd(c.readout_s, c.readout_s_sd, 1e3),
+            c.rows
+        ),
+        // What others call the read-out of so many rows: from the start of the first row to that of the last.
+        format!(
+            "first to last row  {} ms ({} line times)",
+            with_sd(
+                first_to_last(c.readout_s, c.rows),
+                first_to_last(c.readout_s_sd, c.rows),
+                1e3
+            ),
+            c.rows.saturating_sub(1)
         ),
         format!(
             "line time          {} µs",
@@ -54,6 +65,11 @@ pub(super) fn text(c: &Calibration) -> String {
     lines.join("\n") + "\n"
 }
 
+/// Of `rows` line times, all but one.
+fn first_to_last(readout_s: f64, rows: u32) -> f64 {
+    readout_s * f64::from(rows.saturating_sub(1)) / f64::from(rows.max(1))
+}
+
 /// `value ± sd` with as many digits as the standard deviation calls for (two of it).
 fn with_sd(value: f64, sd: f64, scale: f64) -> String {
     let (value, sd) = (value * scale, sd * scale);
@@ -67,6 +83,26 @@ fn with_sd(value: f64, sd: f64, scale: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The real frame of docs/results.md: its owner counts 1079 line times.
+    #[test]
+    fn both_read_outs_are_told() {
+        let c = Calibration {
+            rows: 1080,
+            readout_s: 15.7440e-3,
+            readout_s_sd: 0.6e-6,
+            ..Calibration::default()
+        };
+        let text = text(&c);
+        assert!(
+            text.contains("read-out           15.74400 ± 0.00060 ms (1080 line times)"),
+            "{text}"
+        );
+        assert!(
+            text.contains("first to last row  15.72942 ± 0.00060 ms (1079 line times)"),
+            "{text}"
+        );
+    }
 
     #[test]
     fn digits_follow_the_standard_deviation() {
