@@ -11,6 +11,9 @@ const LOSS: f64 = 0.83;
 const STILL: f64 = 0.7;
 const LARGE_PX: f64 = 0.3;
 const STILL_OF_LARGE: f64 = 0.3;
+/// What knows less of the tone than this share of the whole picture is no part to measure: a lamp's flicker on pixels that
+/// are nearly white, something that passes.
+const LEAST: f64 = 0.08;
 /// This many standard deviations of the amplitude are in its favour.
 const SURE: f64 = 4.0;
 
@@ -161,9 +164,16 @@ pub(super) fn best(tones: &[Vec<Tile>], columns: usize, rows: usize) -> Option<R
         let whole = table.sum(&all_columns, &all_rows).outstanding();
         table.sum(&found.columns, &found.rows).outstanding() / whole.max(1e-9)
     };
+    let knows = |table: &Table, columns: &Range<usize>, rows: &Range<usize>| {
+        let [cc, _, ss] = table.sum(columns, rows).normal;
+        cc + ss
+    };
+    let large = tables
+        .iter()
+        .all(|t| knows(t, &found.columns, &found.rows) > LEAST * knows(t, &all_columns, &all_rows));
     let gains: Vec<f64> = tables.iter().map(gain).collect();
     let worth = gains.iter().any(|&g| g > GAIN) && gains.iter().all(|&g| g > LOSS);
-    worth.then_some(found)
+    (large && worth).then_some(found)
 }
 
 fn ranges(n: usize) -> impl Iterator<Item = Range<usize>> {
@@ -223,6 +233,18 @@ mod tests {
             }
         };
         assert_eq!(chosen(&[tiles(0.02, corner)]), Some((9..16, 0..5)));
+    }
+
+    #[test]
+    fn a_single_tile_is_no_part() {
+        let tile = |x, y| {
+            if (x, y) == (3, 4) {
+                [0.3, 0.0]
+            } else {
+                [0.0; 2]
+            }
+        };
+        assert_eq!(chosen(&[tiles(0.03, tile)]), None);
     }
 
     #[test]
