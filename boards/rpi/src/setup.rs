@@ -168,21 +168,33 @@ fn line_time_s(
     Ok(seconds)
 }
 
-/// `line_time_s` of a calibration file, which must be of a picture of so many rows: another mode's is another.
+/// `line_time_s` of a calibration file, which must be of a picture of so many rows: another mode's is another. Which way
+/// its picture rolled does not matter: a sensor's lines come here as they are read.
 fn calibrated(file: &Path, rows: u16) -> Result<f64, SetupError> {
     let refuse = |why: String| SetupError::Calibration {
         file: file.to_owned(),
         why,
     };
     let text = std::fs::read_to_string(file).map_err(|e| refuse(format!("cannot be read: {e}")))?;
-    let table: toml::Table = text
-        .parse()
-        .map_err(|e: toml::de::Error| refuse(e.message().to_owned()))?;
+    let line = |at: usize| text.bytes().take(at).filter(|&b| b == b'\n').count() + 1;
+    let line_of = |key: &str| {
+        let begins = |l: &str| l.split('=').next().is_some_and(|k| k.trim() == key);
+        let line = text.lines().position(begins);
+        line.map_or(String::new(), |line| format!("line {}: ", line + 1))
+    };
+    let table: toml::Table = text.parse().map_err(|e: toml::de::Error| {
+        let line = e.span().map_or(1, |span| line(span.start));
+        let what = e.message().lines().next().unwrap_or_default();
+        refuse(format!(
+            "line {line}: {what}: make it with `rowtone calibrate -o FILE`"
+        ))
+    })?;
     let its_rows = table.get("rows").and_then(toml::Value::as_integer);
     if let Some(its_rows) = its_rows.filter(|&its_rows| its_rows != rows.into()) {
         let why = format!(
-            "it was made with pictures of {its_rows} rows, and these have {rows}: calibrate in this mode, or give \
-             camera.mode"
+            "{}it was made with pictures of {its_rows} rows, and these have {rows}: calibrate in this mode, or give \
+             camera.mode",
+            line_of("rows")
         );
         return Err(refuse(why));
     }
@@ -191,7 +203,10 @@ fn calibrated(file: &Path, rows: u16) -> Result<f64, SetupError> {
         .and_then(toml::Value::as_float)
         .filter(|s| (1e-7..4e-3).contains(s))
         .ok_or_else(|| {
-            refuse("no usable line_time_s in it: make it with `rowtone calibrate`".into())
+            let line = line_of("line_time_s");
+            refuse(format!(
+                "{line}no usable line_time_s in it: make it with `rowtone calibrate -o FILE`"
+            ))
         })
 }
 
@@ -281,10 +296,14 @@ mod tests {
         for (text, why) in [
             (
                 "rows = 1080\nline_time_s = 7.94e-6\n",
-                "pictures of 1080 rows",
+                "line 1: it was made with pictures of 1080 rows",
             ),
-            ("rows = 990\n", "no usable line_time_s"),
-            ("rows = 990\nline_time_s = nan\n", "no usable line_time_s"),
+            ("rows = 990\n", ": no usable line_time_s"),
+            (
+                "rows = 990\nline_time_s = nan\n",
+                "line 2: no usable line_time_s",
+            ),
+            ("rows = 990\n\nline_time_s = oops\n", "line 3: "),
         ] {
             std::fs::write(&path, text).unwrap();
             let error = setup().unwrap_err().to_string();
