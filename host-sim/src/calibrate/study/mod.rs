@@ -235,16 +235,3 @@ pub fn row(condition: &Condition, first: u64, seeds: u64) -> Result<String, SimE
     let _ = write!(text, " {} |", tally.reasons.join("; "));
     Ok(text)
 }
-
-/// `seeds` recordings of every condition, as Markdown.
-///
-/// # Errors
-/// [`SimError`] for an impossible configuration.
-pub fn markdown(seeds: u64) -> Result<String, SimError> {
-    let mut text = format!("{HEAD}\n");
-    for condition in condition::all() {
-        text += &row(&condition, 1, seeds)?;
-        text.push('\n');
-    }
-    Ok(text)
-}
