@@ -78,19 +78,24 @@ pub struct Settings {
     pub unit: u8,
 }
 
+impl Settings {
+    /// [`Settings::default`], as a constant.
+    pub const DEFAULT: Self = Self {
+        window_s: 1.0,
+        hop_s: 0.5,
+        max_peaks: 8,
+        false_alarm: 1e-3,
+        um_per_px: None,
+        roi: None,
+        min_hz: None,
+        max_hz: None,
+        wire: Wire::Text,
+        unit: 1,
+    };
+}
+
 impl Default for Settings {
     fn default() -> Self {
-        Self {
-            window_s: 1.0,
-            hop_s: 0.5,
-            max_peaks: 8,
-            false_alarm: 1e-3,
-            um_per_px: None,
-            roi: None,
-            min_hz: None,
-            max_hz: None,
-            wire: Wire::Text,
-            unit: 1,
-        }
+        Self::DEFAULT
     }
 }

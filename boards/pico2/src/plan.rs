@@ -5,7 +5,7 @@ use crate::clock::FrameClock;
 use crate::hm01b0;
 use crate::memory::{COLUMNS_PER_LINE, FRAMES, MAX_PASSES, rows_per_sample};
 use rowtone::camera::Timing;
-use rowtone::settings::{Limits, Region, Settings, Wire};
+use rowtone::settings::{Limits, Region, Settings};
 use rowtone::spectrum;
 use rowtone::timeline::Group;
 use rowtone::tracker;
@@ -22,19 +22,8 @@ pub const LIMITS: Limits = Limits {
     max_window_s: FRAMES as f32 / 64.0,
 };
 
-/// How it is set when it comes from the factory: [`Settings::default`], as a constant.
-pub const DEFAULTS: Settings = Settings {
-    window_s: 1.0,
-    hop_s: 0.5,
-    max_peaks: 8,
-    false_alarm: 1e-3,
-    um_per_px: None,
-    roi: None,
-    min_hz: None,
-    max_hz: None,
-    wire: Wire::Text,
-    unit: 1,
-};
+/// How it is set when it comes from the factory.
+pub const DEFAULTS: Settings = Settings::DEFAULT;
 
 /// The whole picture.
 const WHOLE: Region = Region {
