@@ -10,9 +10,7 @@ use super::film::Setup;
 use crate::failure::Failure;
 use crate::figure::lines::{Curve, Lines};
 use crate::linear::median;
-use crate::methods::fourier::C;
-use crate::methods::shearlet::{DIRECTIONS, Pyramid};
-use crate::methods::thesis::{Thesis, correlate_rows, unit};
+use crate::methods::thesis::Thesis;
 use crate::methods::visual::{By, VisualMicrophone};
 use crate::methods::{Clip, Method, Shifts};
 use crate::sim::{Motion, Step};
@@ -24,22 +22,7 @@ const PLACES: [f64; 12] = [
 
 /// Each row's shift against the first frame, by one sub-band of the shearlet each.
 fn shearlet(clip: &Clip, thesis: &Thesis) -> Vec<Shifts> {
-    let pyramid = Pyramid::new(clip.width, clip.height, &DIRECTIONS);
-    let spectra: Vec<Vec<C>> = clip
-        .frames
-        .iter()
-        .map(|f| pyramid.bank.spectrum(f))
-        .collect();
-    thesis
-        .used(&pyramid)
-        .map(|band| {
-            let phases: Vec<Vec<C>> = spectra
-                .iter()
-                .map(|s| unit(pyramid.bank.band(s, band)))
-                .collect();
-            correlate_rows(&phases, &phases[0], clip.width)
-        })
-        .collect()
+    thesis.by_band(clip, |phases| phases[0].clone())
 }
 
 /// Median over all rows (and sub-bands) of each frame against the first, and the share within half a pixel of the truth.

@@ -79,8 +79,8 @@ impl Plane {
     }
 }
 
-/// Frequency of bin `k` of `size`, radians.
-fn wrapped(k: usize, size: usize) -> f64 {
+/// Frequency of bin `k` of `size`, radians a sample, −π to π.
+pub fn wrapped(k: usize, size: usize) -> f64 {
     let k = if 2 * k > size {
         k as f64 - size as f64
     } else {

@@ -56,29 +56,33 @@ impl Method for Thesis {
     }
 
     fn shifts(&self, clip: &Clip) -> Shifts {
+        align_and_sum(self.by_band(clip, reference_phase))
+    }
+}
+
+impl Thesis {
+    /// Each row's shift in every frame, by one sub-band that is used each, against what `reference` makes of all frames'
+    /// phases.
+    pub fn by_band(&self, clip: &Clip, reference: impl Fn(&[Vec<C>]) -> Vec<C>) -> Vec<Shifts> {
         let pyramid = Pyramid::new(clip.width, clip.height, &self.directions);
         let spectra: Vec<Vec<C>> = clip
             .frames
             .iter()
             .map(|f| pyramid.bank.spectrum(f))
             .collect();
-        let signals = self
-            .used(&pyramid)
+        self.used(&pyramid)
             .map(|band| {
                 let phases: Vec<Vec<C>> = spectra
                     .iter()
                     .map(|s| unit(pyramid.bank.band(s, band)))
                     .collect();
-                correlate_rows(&phases, &reference_phase(&phases), clip.width)
+                correlate_rows(&phases, &reference(&phases), clip.width)
             })
-            .collect();
-        align_and_sum(signals)
+            .collect()
     }
-}
 
-impl Thesis {
     /// Sub-bands of the horizontal cone in the scales that are used.
-    pub fn used(&self, pyramid: &Pyramid) -> impl Iterator<Item = usize> {
+    fn used(&self, pyramid: &Pyramid) -> impl Iterator<Item = usize> {
         (0..pyramid.bands.len()).filter(|&b| {
             let band = pyramid.bands[b];
             band.cone == Cone::Horizontal && self.scales.contains(&band.scale)
@@ -87,7 +91,7 @@ impl Thesis {
 }
 
 /// Only the phase, as unit vectors.
-pub fn unit(coefficients: Vec<C>) -> Vec<C> {
+fn unit(coefficients: Vec<C>) -> Vec<C> {
     coefficients
         .into_iter()
         .map(|c| {
@@ -102,7 +106,7 @@ pub fn unit(coefficients: Vec<C>) -> Vec<C> {
 }
 
 /// Algorithm 1: the mean phase of all frames.
-pub fn reference_phase(phases: &[Vec<C>]) -> Vec<C> {
+fn reference_phase(phases: &[Vec<C>]) -> Vec<C> {
     let mut sum = vec![C::new(0.0, 0.0); phases.first().map_or(0, Vec::len)];
     for frame in phases {
         sum.iter_mut().zip(frame).for_each(|(r, p)| *r += p);
@@ -111,7 +115,7 @@ pub fn reference_phase(phases: &[Vec<C>]) -> Vec<C> {
 }
 
 /// Shift of every row of phases against the reference's, px.
-pub fn correlate_rows(phases: &[Vec<C>], reference: &[C], width: usize) -> Shifts {
+fn correlate_rows(phases: &[Vec<C>], reference: &[C], width: usize) -> Shifts {
     let correlation = PhaseCorrelation::new(width);
     let rows = |frame: &[C]| -> Vec<Vec<C>> {
         frame

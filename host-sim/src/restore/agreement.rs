@@ -1,10 +1,9 @@
 //! How well a recovered sound agrees with the true one, after gain and delay are fitted.
 
-use std::f64::consts::TAU;
-
 use rustfft::{FftPlanner, num_complex::Complex};
 
 use crate::linear::dot;
+use crate::methods::fourier::wrapped;
 
 /// Gain, delay and what is left.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -52,7 +51,7 @@ pub fn agree(truth: &[f64], recovered: &[f64], rate_hz: f64, reach_s: f64) -> Ag
     let mut shifted: Vec<Complex<f64>> = of_recovered
         .iter()
         .enumerate()
-        .map(|(k, v)| v * Complex::from_polar(1.0, angular(k, size) * delay))
+        .map(|(k, v)| v * Complex::from_polar(1.0, wrapped(k, size) * delay))
         .collect();
     inverse.process(&mut shifted);
     let from = (-delay).max(0.0).ceil() as usize;
@@ -88,16 +87,6 @@ fn without_mean(signal: &[f64]) -> Vec<f64> {
     signal.iter().map(|v| v - mean).collect()
 }
 
-/// Radians a sample of bin `k`, −π to π.
-fn angular(k: usize, size: usize) -> f64 {
-    let k = if 2 * k > size {
-        k as f64 - size as f64
-    } else {
-        k as f64
-    };
-    TAU * k / size as f64
-}
-
 /// The lag within a sample of `start` at which the correlation is largest (golden section).
 fn finest(cross: &[Complex<f64>], start: f64) -> f64 {
     let size = cross.len();
@@ -106,7 +95,7 @@ fn finest(cross: &[Complex<f64>], start: f64) -> f64 {
             .iter()
             .enumerate()
             .map(|(k, c)| {
-                let (s, co) = (angular(k, size) * lag).sin_cos();
+                let (s, co) = (wrapped(k, size) * lag).sin_cos();
                 c.re * co - c.im * s
             })
             .sum()
