@@ -53,6 +53,9 @@ type Words = Groups<1, 2, 1>;
     allow(dead_code)
 )]
 impl<const PIXELS: usize, const BYTES: usize, const FIRST: usize> Groups<PIXELS, BYTES, FIRST> {
+    /// Pixels and bytes of a group, and the first wanted byte.
+    const GROUP: (usize, usize, usize) = (PIXELS, BYTES, FIRST);
+
     /// Bytes of eight pixels.
     const HALF: usize = 8 / PIXELS * BYTES;
 
@@ -119,9 +122,9 @@ impl Spread {
     /// Pixels and bytes of a group, and the first wanted byte.
     const fn group(self) -> (usize, usize, usize) {
         match self {
-            Self::Packed10 => (4, 5, 0),
-            Self::Packed12 => (2, 3, 0),
-            Self::Words => (1, 2, 1),
+            Self::Packed10 => Packed10::GROUP,
+            Self::Packed12 => Packed12::GROUP,
+            Self::Words => Words::GROUP,
         }
     }
 
