@@ -5,7 +5,7 @@ use core::f32::consts::TAU;
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use rowtone::camera::{Line, Pixels, Timing};
 use rowtone::kernel::Kernel;
-use rowtone::tracker::{Config, Stage, Storage, Tracker};
+use rowtone::tracker::{Config, Stage, StaticStorage, Tracker};
 
 const LEARN_FRAMES: u16 = 8;
 
@@ -137,27 +137,8 @@ fn lines(c: &mut Criterion) {
         let timing = Timing::new(16_000_000, 300_000, rows).expect("rows");
         let mut config = Config::new(timing, width as u16);
         config.learn_frames = LEARN_FRAMES;
-        let pixels = width * usize::from(rows);
-        let (mut coefficients, mut mean) = (vec![0; pixels], vec![0; pixels]);
-        let height = usize::from(rows);
-        let (mut tables, mut learning) = (
-            vec![Default::default(); height],
-            vec![Default::default(); height],
-        );
-        let (mut mask, mut columns) = (vec![255; width], vec![Default::default(); width]);
-        let mut fresh = vec![0; width];
-        let mut scratch = vec![0.0; 2 * width];
-        let storage = Storage {
-            coefficients: &mut coefficients,
-            tables: &mut tables,
-            mean: &mut mean,
-            learning: &mut learning,
-            mask: &mut mask,
-            columns: &mut columns,
-            fresh: &mut fresh,
-            scratch: &mut scratch,
-        };
-        let mut tracker = Tracker::new(config, storage).expect("buffers that fit");
+        let mut storage = Box::new(StaticStorage::<{ 640 * 960 }, 960, 1280>::new());
+        let mut tracker = Tracker::new(config, storage.lend()).expect("buffers that fit");
         let frames = frames(width, rows, amplitude_px);
         let mut number = 0;
         let mut push_all = |tracker: &mut Tracker<'_>, frame: &[u8]| {

@@ -38,28 +38,16 @@
 //!
 //! ```
 //! use rowtone::camera::{Line, Pixels, Timing};
-//! use rowtone::tracker::{Config, Outcome, Storage, Tracker};
+//! use rowtone::tracker::{Config, Outcome, StaticStorage, Tracker};
 //!
 //! const WIDTH: usize = 64;
 //! const ROWS: usize = 8;
 //! let timing = Timing::new(30_000_000, 0, ROWS as u16)?; // 30 µs from row to row
 //! let mut config = Config::new(timing, WIDTH as u16);
 //! config.learn_frames = 8;
-//! // The caller decides where memory lives: statics on a microcontroller, a heap on a desktop.
-//! let (mut coefficients, mut mean) = ([0; WIDTH * ROWS], [0; WIDTH * ROWS]);
-//! let (mut tables, mut learning) = ([Default::default(); ROWS], [Default::default(); ROWS]);
-//! let (mut mask, mut columns) = ([255; WIDTH], [Default::default(); WIDTH]);
-//! let (mut fresh, mut scratch) = ([0; WIDTH], [0.0; 2 * WIDTH]);
-//! let mut tracker = Tracker::new(config, Storage {
-//!     coefficients: &mut coefficients,
-//!     tables: &mut tables,
-//!     mean: &mut mean,
-//!     learning: &mut learning,
-//!     mask: &mut mask,
-//!     columns: &mut columns,
-//!     fresh: &mut fresh,
-//!     scratch: &mut scratch,
-//! })?;
+//! // The caller decides where memory lives: a static on a microcontroller, a heap on a desktop.
+//! let mut storage = StaticStorage::<{ WIDTH * ROWS }, ROWS, WIDTH>::new();
+//! let mut tracker = Tracker::new(config, storage.lend())?;
 //! let swing = |ns: i64| 0.2 * (core::f32::consts::TAU * 7.0 * ns as f32 * 1e-9).sin();
 //! let mut worst: f32 = 0.0;
 //! for frame in 0..60 {

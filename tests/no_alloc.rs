@@ -11,13 +11,12 @@ use rowtone::camera::{Line, Pixels, Timing};
 use rowtone::kernel::Kernel;
 use rowtone::link::Link;
 use rowtone::outbox::Outbox;
-use rowtone::reference::RowTable;
 use rowtone::report::Report;
 use rowtone::settings::store::{Nowhere, Started};
 use rowtone::settings::{Board, Console, Limits, Settings, Wire};
-use rowtone::spectrum::{self, StaticStorage};
+use rowtone::spectrum;
 use rowtone::timeline::{Binner, Group};
-use rowtone::tracker::{ColumnLearning, Config, Outcome, RowLearning, Storage, Tracker};
+use rowtone::tracker::{self, Config, Outcome, Tracker};
 use rowtone::wire::{Message, SettingsOrigin, binary, text};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
@@ -101,16 +100,9 @@ fn nothing_is_allocated_from_lines_to_bytes() {
     // What the allocator counts at all.
     assert!(calls_of(|| drop(vec![1u8; 10])).0 >= 2);
 
-    let mut coefficients = [0i8; WIDTH * ROWS];
-    let mut tables = [RowTable::default(); ROWS];
-    let mut mean = [0u16; WIDTH * ROWS];
-    let mut learning = [RowLearning::default(); ROWS];
-    let mut mask = [255u8; WIDTH];
-    let mut columns = [ColumnLearning::default(); WIDTH];
-    let mut fresh = [0i8; WIDTH];
-    let mut scratch = [0.0f32; 2 * WIDTH];
-    let mut spectrum = StaticStorage::<2048, 64, 16, 1024, 5>::new();
-    let mut halves = StaticStorage::<2048, 64, 16, 1024, 5>::new();
+    let mut picture = tracker::StaticStorage::<{ WIDTH * ROWS }, ROWS, WIDTH>::new();
+    let mut spectrum = spectrum::StaticStorage::<2048, 64, 16, 1024, 5>::new();
+    let mut halves = spectrum::StaticStorage::<2048, 64, 16, 1024, 5>::new();
     let mut slots = [const { None::<Report> }; 4];
     let mut pixels = [0u8; WIDTH];
     let mut deep = [0u16; WIDTH];
@@ -124,17 +116,7 @@ fn nothing_is_allocated_from_lines_to_bytes() {
                 kernel,
                 ..Config::new(timing, WIDTH as u16)
             };
-            let storage = Storage {
-                coefficients: &mut coefficients,
-                tables: &mut tables,
-                mean: &mut mean,
-                learning: &mut learning,
-                mask: &mut mask,
-                columns: &mut columns,
-                fresh: &mut fresh,
-                scratch: &mut scratch,
-            };
-            let mut tracker = Tracker::new(config, storage).unwrap();
+            let mut tracker = Tracker::new(config, picture.lend()).unwrap();
             let group = Group::new(timing, 1).unwrap();
             let mut binner = Binner::new(group);
             let config = spectrum::Config::default();

@@ -8,51 +8,10 @@ use rowtone::band::Level;
 use rowtone::camera::{Line, Pixels, Timing};
 use rowtone::kernel::Kernel;
 use rowtone::raw::RawFormat;
-use rowtone::reference::RowTable;
-use rowtone::spectrum::{self, StaticStorage};
+use rowtone::spectrum;
 use rowtone::timeline::{Binner, Displacement, Group};
-use rowtone::tracker::{ColumnLearning, Config, Outcome, RowLearning, Storage, Tracker};
+use rowtone::tracker::{self, Config, Outcome, Tracker};
 use rowtone::wire::{Message, binary, text};
-
-/// Memory of a tracker of any size.
-struct Memory {
-    coefficients: Vec<i8>,
-    tables: Vec<RowTable>,
-    mean: Vec<u16>,
-    learning: Vec<RowLearning>,
-    mask: Vec<u8>,
-    columns: Vec<ColumnLearning>,
-    fresh: Vec<i8>,
-    scratch: Vec<f32>,
-}
-
-impl Memory {
-    fn new(width: usize, rows: usize, mask: Vec<u8>) -> Self {
-        Self {
-            coefficients: vec![0; width * rows],
-            tables: vec![RowTable::default(); rows],
-            mean: vec![0; width * rows],
-            learning: vec![RowLearning::default(); rows],
-            mask,
-            columns: vec![ColumnLearning::default(); width],
-            fresh: vec![0; width],
-            scratch: vec![0.0; 2 * width],
-        }
-    }
-
-    fn lend(&mut self) -> Storage<'_> {
-        Storage {
-            coefficients: &mut self.coefficients,
-            tables: &mut self.tables,
-            mean: &mut self.mean,
-            learning: &mut self.learning,
-            mask: &mut self.mask,
-            columns: &mut self.columns,
-            fresh: &mut self.fresh,
-            scratch: &mut self.scratch,
-        }
-    }
-}
 
 /// A small fast generator (xorshift64*, Vigna 2016).
 struct Dice(u64);
@@ -159,13 +118,15 @@ proptest! {
             100..200 => dice.roll() as u8,
             _ => 0,
         });
-        let mut memory = Memory::new(width, rows, columns.collect());
+        let mut memory = Box::new(tracker::StaticStorage::<{ 700 * 40 }, 40, 700>::new());
+        let lent = memory.lend();
+        lent.mask.iter_mut().zip(columns).for_each(|(weight, given)| *weight = given);
         let mut room = vec![0; room];
-        let mut tracker = Tracker::new(config, memory.lend()).unwrap().with_line_room(&mut room);
+        let mut tracker = Tracker::new(config, lent).unwrap().with_line_room(&mut room);
         let timing = config.timing;
         let group = Group::new(timing, rows_per_sample.min(timing.rows())).unwrap();
         let mut binner = Binner::new(group);
-        let mut storage = Box::new(StaticStorage::<1024, 64, 64, 256, 4>::new());
+        let mut storage = Box::new(spectrum::StaticStorage::<1024, 64, 64, 256, 4>::new());
         let spectrum = spectrum::Config { window_ns: 300_000_000, hop_ns: 150_000_000, ..Default::default() };
         let mut analyzer = Analyzer::new(spectrum, group, storage.lend()).unwrap();
         let picture: Vec<u16> = (0..width + 40).map(|_| dice.roll() as u16 >> (16 - config.bits)).collect();
@@ -231,7 +192,7 @@ proptest! {
         let timing = Timing::new(line_time_ps, exposure_ns, height).unwrap();
         let group = Group::new(timing, rows_per_sample.min(height)).unwrap();
         let mut binner = Binner::new(group);
-        let mut storage = Box::new(StaticStorage::<1024, 64, 200, 256, 4>::new());
+        let mut storage = Box::new(spectrum::StaticStorage::<1024, 64, 200, 256, 4>::new());
         let mut analyzer = match Analyzer::new(spectrum::Config::default(), group, storage.lend()) {
             Ok(analyzer) => analyzer,
             Err(_) => return Ok(()),

@@ -45,6 +45,16 @@ pub struct RowTable {
 }
 
 impl RowTable {
+    /// Of a row that is not known yet.
+    pub(crate) const EMPTY: Self = Self {
+        px_per_product: 0.0,
+        pixel_sum: 0.0,
+        information: 0,
+        offset: 0,
+        quadratic: 0,
+        cubic: 0,
+    };
+
     /// What the row knows of its shift, 1/px²; 0 where it has too little texture to be measured.
     #[inline(always)]
     pub fn information_per_px2(&self) -> f32 {

@@ -1,7 +1,7 @@
-//! How a tracker is to work, and the memory that it is lent.
+//! How a tracker is to work.
 
-use super::{ColumnLearning, RowLearning};
-use crate::{band::Level, camera::Timing, kernel::Kernel, reference::RowTable};
+use super::Storage;
+use crate::{band::Level, camera::Timing, kernel::Kernel};
 use core::fmt;
 
 /// How a tracker is to work. Plain data, checked by [`Tracker::new`](super::Tracker::new).
@@ -49,29 +49,6 @@ impl Config {
             kernel: Kernel::detect(),
         }
     }
-}
-
-/// Memory of a tracker, lent by the caller: 3·width + 24 bytes a row, and 16 bytes a column. The line
-/// path itself reads width + 16 bytes a row.
-#[derive(Debug)]
-pub struct Storage<'a> {
-    /// width × rows: the coefficients of the inner products.
-    pub coefficients: &'a mut [i8],
-    /// rows: what the line path needs besides.
-    pub tables: &'a mut [RowTable],
-    /// width × rows: the reference picture, in counts.
-    pub mean: &'a mut [u16],
-    /// rows: what learning needs.
-    pub learning: &'a mut [RowLearning],
-    /// width: weight of each column, 0 = unused … 255. Kept as given, but for dead columns, which are
-    /// masked.
-    pub mask: &'a mut [u8],
-    /// width: what learning needs of the columns.
-    pub columns: &'a mut [ColumnLearning],
-    /// width: the coefficients of a row that is being built anew while its old ones still serve.
-    pub fresh: &'a mut [i8],
-    /// 2 × width: scratch of building coefficients.
-    pub scratch: &'a mut [f32],
 }
 
 /// Why a [`Config`] or [`Storage`] was refused.
@@ -133,28 +110,6 @@ impl Config {
         if self.learn_frames == 0 {
             return Err(ConfigError::LearnFrames);
         }
-        let (width, rows) = (usize::from(self.width), usize::from(self.rows));
-        let pixels = width * rows;
-        Ok(Storage {
-            coefficients: cut("coefficients", storage.coefficients, pixels)?,
-            tables: cut("tables", storage.tables, rows)?,
-            mean: cut("mean", storage.mean, pixels)?,
-            learning: cut("learning", storage.learning, rows)?,
-            mask: cut("mask", storage.mask, width)?,
-            columns: cut("columns", storage.columns, width)?,
-            fresh: cut("fresh", storage.fresh, width)?,
-            scratch: cut("scratch", storage.scratch, 2 * width)?,
-        })
+        storage.cut(usize::from(self.width), usize::from(self.rows))
     }
-}
-
-fn cut<'a, T>(
-    name: &'static str,
-    buffer: &'a mut [T],
-    needs: usize,
-) -> Result<&'a mut [T], ConfigError> {
-    let has = buffer.len();
-    buffer
-        .get_mut(..needs)
-        .ok_or(ConfigError::Buffer { name, has, needs })
 }

@@ -32,7 +32,20 @@ pub struct ColumnLearning {
     changes: u16,
 }
 
+impl ColumnLearning {
+    pub(super) const EMPTY: Self = Self {
+        first: None,
+        changes: 0,
+    };
+}
+
 impl RowLearning {
+    pub(super) const EMPTY: Self = Self {
+        shift_px: 0.0,
+        frames: 0,
+        light: 0.0,
+    };
+
     pub(super) fn frames(&self) -> u16 {
         self.frames.max(1)
     }

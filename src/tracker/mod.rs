@@ -21,13 +21,15 @@ mod line;
 mod overlap;
 mod predict;
 mod row;
+mod storage;
 #[cfg(test)]
 mod tests;
 mod watch;
 
-pub use config::{Config, ConfigError, Storage};
+pub use config::{Config, ConfigError};
 pub use counts::Counts;
 pub use learn::{ColumnLearning, RowLearning};
+pub use storage::{StaticStorage, Storage};
 
 use crate::{
     band::Level,

@@ -5,7 +5,7 @@ use super::*;
 use crate::raw::RawFormat;
 use crate::{band::MAX_HALF, camera::Timing};
 extern crate std;
-use std::{vec, vec::Vec};
+use std::{boxed::Box, vec::Vec};
 
 const WIDTH: usize = 128;
 const ROWS: usize = 24;
@@ -17,29 +17,11 @@ fn timing() -> Timing {
 }
 
 /// Memory, lent to a tracker once.
-struct Memory {
-    coefficients: Vec<i8>,
-    tables: Vec<RowTable>,
-    mean: Vec<u16>,
-    learning: Vec<RowLearning>,
-    mask: Vec<u8>,
-    columns: Vec<ColumnLearning>,
-    fresh: Vec<i8>,
-    scratch: Vec<f32>,
-}
+struct Memory(Box<StaticStorage<{ WIDTH * ROWS }, ROWS, WIDTH>>);
 
 impl Memory {
     fn new() -> Self {
-        Self {
-            coefficients: vec![0; WIDTH * ROWS],
-            tables: vec![RowTable::default(); ROWS],
-            mean: vec![0; WIDTH * ROWS],
-            learning: vec![RowLearning::default(); ROWS],
-            mask: vec![u8::MAX; WIDTH],
-            columns: vec![ColumnLearning::default(); WIDTH],
-            fresh: vec![0; WIDTH],
-            scratch: vec![0.0; 2 * WIDTH],
-        }
+        Self(Box::default())
     }
 
     fn tracker(&mut self, stride: u8) -> Tracker<'_> {
@@ -58,17 +40,7 @@ impl Memory {
             learn_frames: LEARN_FRAMES,
             ..Config::new(timing(), WIDTH as u16)
         };
-        let storage = Storage {
-            coefficients: &mut self.coefficients,
-            tables: &mut self.tables,
-            mean: &mut self.mean,
-            learning: &mut self.learning,
-            mask: &mut self.mask,
-            columns: &mut self.columns,
-            fresh: &mut self.fresh,
-            scratch: &mut self.scratch,
-        };
-        Tracker::new(config, storage).unwrap()
+        Tracker::new(config, self.0.lend()).unwrap()
     }
 }
 

@@ -8,7 +8,7 @@ use rowtone::camera::{Timing, TimingError};
 use rowtone::report::Report;
 use rowtone::spectrum;
 use rowtone::timeline::{Binner, BinnerError, Group, Sample};
-use rowtone::tracker::{self, Tracker};
+use rowtone::tracker::{self, StaticStorage, Tracker};
 use rowtone::wire::{Message, text};
 use rowtone_mps2_an505::args::Args;
 use rowtone_mps2_an505::board::{
@@ -18,12 +18,12 @@ use rowtone_mps2_an505::board::{
     uart::Uart,
 };
 use rowtone_mps2_an505::figures::Count;
-use rowtone_pico2::memory::{SpectrumMemory, TrackerMemory, rows_per_sample};
+use rowtone_pico2::memory::{SpectrumMemory, rows_per_sample};
 use static_cell::{ConstStaticCell, StaticCell};
 
 /// The RP2350 has room for a picture of 320 x 240; a narrower one may have more rows here.
-static LINES: ConstStaticCell<TrackerMemory<{ 320 * 240 }, 480, MAX_WIDTH>> =
-    ConstStaticCell::new(TrackerMemory::new());
+static LINES: ConstStaticCell<StaticStorage<{ 320 * 240 }, 480, MAX_WIDTH>> =
+    ConstStaticCell::new(StaticStorage::new());
 static SPECTRUM: ConstStaticCell<SpectrumMemory> = ConstStaticCell::new(SpectrumMemory::new());
 static ANALYZER: StaticCell<Analyzer<'static>> = StaticCell::new();
 

@@ -4,10 +4,10 @@ use rowtone::analyzer::Analyzer;
 use rowtone::camera::Line;
 use rowtone::spectrum;
 use rowtone::timeline::{Binner, Displacement, Group, rows_per_sample};
-use rowtone::tracker::{Config, ConfigError, Outcome, Storage, Tracker};
+use rowtone::tracker::{Config, ConfigError, Outcome, Tracker};
 
 use super::case::Case;
-use crate::memory::SpectrumMemory;
+use crate::memory::{SpectrumMemory, TrackerMemory};
 use crate::sim::{Camera, Frame, SimError, crlb};
 use crate::tracking::subtract;
 
@@ -56,51 +56,19 @@ impl std::fmt::Display for CaseError {
 
 impl std::error::Error for CaseError {}
 
-/// Memory of a tracker.
-struct Memory {
-    coefficients: Vec<i8>,
-    tables: Vec<rowtone::reference::RowTable>,
-    mean: Vec<u16>,
-    learning: Vec<rowtone::tracker::RowLearning>,
-    mask: Vec<u8>,
-    columns: Vec<rowtone::tracker::ColumnLearning>,
-    fresh: Vec<i8>,
-    scratch: Vec<f32>,
-}
-
-impl Memory {
-    fn new(width: usize, rows: usize) -> Self {
-        Self {
-            coefficients: vec![0; width * rows],
-            tables: vec![Default::default(); rows],
-            mean: vec![0; width * rows],
-            learning: vec![Default::default(); rows],
-            mask: vec![u8::MAX; width],
-            columns: vec![Default::default(); width],
-            fresh: vec![0; width],
-            scratch: vec![0.0; 2 * width],
-        }
-    }
-
-    fn tracker(&mut self, camera: &Camera, case: &Case) -> Result<Tracker<'_>, CaseError> {
-        let config = Config {
-            bits: case.config.sensor.bits,
-            learn_frames: case.learn_frames,
-            columns_per_line: case.columns_per_line.unwrap_or(u16::MAX),
-            ..Config::new(camera.timing(), self.mask.len() as u16)
-        };
-        let storage = Storage {
-            coefficients: &mut self.coefficients,
-            tables: &mut self.tables,
-            mean: &mut self.mean,
-            learning: &mut self.learning,
-            mask: &mut self.mask,
-            columns: &mut self.columns,
-            fresh: &mut self.fresh,
-            scratch: &mut self.scratch,
-        };
-        Tracker::new(config, storage).map_err(CaseError::Tracker)
-    }
+fn tracker<'a>(
+    memory: &'a mut TrackerMemory,
+    width: usize,
+    camera: &Camera,
+    case: &Case,
+) -> Result<Tracker<'a>, CaseError> {
+    let config = Config {
+        bits: case.config.sensor.bits,
+        learn_frames: case.learn_frames,
+        columns_per_line: case.columns_per_line.unwrap_or(u16::MAX),
+        ..Config::new(camera.timing(), width as u16)
+    };
+    Tracker::new(config, memory.lend()).map_err(CaseError::Tracker)
 }
 
 /// Measures a recording.
@@ -111,12 +79,18 @@ pub fn measure(case: &Case) -> Result<Figures, CaseError> {
     let camera = Camera::new(case.config.clone()).map_err(CaseError::Simulation)?;
     let (cols, rows) = (case.config.sensor.cols as usize, case.config.sensor.rows);
     let split = case.config.background_cols as usize;
-    let mut memory = Memory::new(cols - split, rows as usize);
-    let mut still_memory = Memory::new(split.max(16), rows as usize);
-    let mut tracker = memory.tracker(&camera, case)?;
+    let (width, still_width) = (cols - split, split.max(16));
+    let mut memory = TrackerMemory::new(width, rows as usize);
+    let mut still_memory = TrackerMemory::new(still_width, rows as usize);
+    let mut tracker = self::tracker(&mut memory, width, &camera, case)?;
     let mut still = match split {
         0 => None,
-        _ => Some(still_memory.tracker(&camera, case)?),
+        _ => Some(self::tracker(
+            &mut still_memory,
+            still_width,
+            &camera,
+            case,
+        )?),
     };
     let mut sums = Sums::new(&camera);
     let mut peaks = Vec::new();

@@ -1,9 +1,10 @@
 //! This project's own line engine as one [`Method`] among the others.
 
 use rowtone::camera::{Line, Pixels, Timing};
-use rowtone::tracker::{Config, Outcome, Stage, Storage, Tracker};
+use rowtone::tracker::{Config, Outcome, Stage, Tracker};
 
 use super::{Clip, Method, Shifts};
+use crate::memory::TrackerMemory;
 
 /// The core's tracker: two rounds of learning over all frames, then one inner product a line.
 #[derive(Clone, Copy, Debug)]
@@ -22,25 +23,6 @@ impl Method for Core {
     }
 
     fn shifts(&self, clip: &Clip) -> Shifts {
-        let pixels = clip.width * clip.height;
-        let mut coefficients = vec![0; pixels];
-        let mut tables = vec![Default::default(); clip.height];
-        let mut mean = vec![0; pixels];
-        let mut learning = vec![Default::default(); clip.height];
-        let mut mask = vec![u8::MAX; clip.width];
-        let mut columns = vec![Default::default(); clip.width];
-        let mut fresh = vec![0; clip.width];
-        let mut scratch = vec![0.0; 2 * clip.width];
-        let storage = Storage {
-            coefficients: &mut coefficients,
-            tables: &mut tables,
-            mean: &mut mean,
-            learning: &mut learning,
-            mask: &mut mask,
-            columns: &mut columns,
-            fresh: &mut fresh,
-            scratch: &mut scratch,
-        };
         let count = clip.frames.len();
         let silent = vec![vec![f64::NAN; clip.height]; count];
         let (Ok(width), Ok(rows), Ok(learn_frames)) = (
@@ -56,7 +38,8 @@ impl Method for Core {
             learn_frames,
             ..Config::new(self.timing, width)
         };
-        let Ok(mut tracker) = Tracker::new(config, storage) else {
+        let mut memory = TrackerMemory::new(clip.width, clip.height);
+        let Ok(mut tracker) = Tracker::new(config, memory.lend()) else {
             return silent;
         };
         let mut shifts = silent;

@@ -4,53 +4,11 @@ use std::ops::Range;
 
 use rowtone::camera::Timing;
 use rowtone::timeline::{Binner, Curvature, Displacement, Sample};
-use rowtone::tracker::{Config, ConfigError, Counts, Outcome, Storage, Tracker};
+use rowtone::tracker::{Config, ConfigError, Counts, Outcome, Tracker};
 
 use crate::failure::Failure;
 use crate::input::{Frame, Rect};
-
-/// Memory that a tracker borrows.
-#[derive(Debug)]
-pub struct Buffers {
-    coefficients: Vec<i8>,
-    tables: Vec<rowtone::reference::RowTable>,
-    mean: Vec<u16>,
-    learning: Vec<rowtone::tracker::RowLearning>,
-    mask: Vec<u8>,
-    columns: Vec<rowtone::tracker::ColumnLearning>,
-    fresh: Vec<i8>,
-    scratch: Vec<f32>,
-}
-
-impl Buffers {
-    /// Memory for a part of this size.
-    pub fn new(part: &Rect) -> Self {
-        let pixels = part.width * part.height;
-        Self {
-            coefficients: vec![0; pixels],
-            tables: vec![Default::default(); part.height],
-            mean: vec![0; pixels],
-            learning: vec![Default::default(); part.height],
-            mask: vec![u8::MAX; part.width],
-            columns: vec![Default::default(); part.width],
-            fresh: vec![0; part.width],
-            scratch: vec![0.0; 2 * part.width],
-        }
-    }
-
-    fn storage(&mut self) -> Storage<'_> {
-        Storage {
-            coefficients: &mut self.coefficients,
-            tables: &mut self.tables,
-            mean: &mut self.mean,
-            learning: &mut self.learning,
-            mask: &mut self.mask,
-            columns: &mut self.columns,
-            fresh: &mut self.fresh,
-            scratch: &mut self.scratch,
-        }
-    }
-}
+use crate::memory::TrackerMemory;
 
 /// How many lines could not be measured, and why.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -101,7 +59,7 @@ impl<'a> Engine<'a> {
         timing: Timing,
         bits: u8,
         learn_frames: u16,
-        buffers: &'a mut Buffers,
+        memory: &'a mut TrackerMemory,
         name: &str,
     ) -> Result<Self, Failure> {
         let refuse = |error: ConfigError| Failure::input(format!("{name}: {error}"));
@@ -113,7 +71,7 @@ impl<'a> Engine<'a> {
             learn_frames,
             ..Config::new(timing, width)
         };
-        let tracker = Tracker::new(config, buffers.storage()).map_err(refuse)?;
+        let tracker = Tracker::new(config, memory.lend()).map_err(refuse)?;
         Ok(Self {
             part,
             rows: 0..part.height,

@@ -14,11 +14,12 @@ pub mod region;
 use rowtone::timeline::{Binner, Displacement, Group, Sample};
 
 pub use background::subtract;
-pub use engine::{Buffers, Engine, Unmeasured};
+pub use engine::{Engine, Unmeasured};
 use region::Region;
 
 use crate::failure::Failure;
 use crate::input::{Camera, Feed, Frame, Rect};
+use crate::memory::TrackerMemory;
 use crate::ring::{Inlet, Next, Outlet, ring};
 
 /// Frames that the reference is learned from.
@@ -88,8 +89,8 @@ impl Shifts {
         // Made here and dropped at once: a part that cannot be measured is refused before anything
         // is read.
         for part in [Some(part), camera.background].into_iter().flatten() {
-            let mut buffers = Buffers::new(&part);
-            Engine::new(part, camera.timing, camera.bits, 1, &mut buffers, &name)?;
+            let mut memory = TrackerMemory::new(part.width, part.height);
+            Engine::new(part, camera.timing, camera.bits, 1, &mut memory, &name)?;
         }
         std::thread::spawn(move || run(feed, part, groups, outlet));
         Ok(Self {
@@ -139,8 +140,9 @@ impl Shifts {
 
 /// The line thread.
 fn run(mut feed: Feed, part: Rect, groups: Option<Group>, mut to: Outlet<FrameShifts, Ending>) {
-    let mut buffers = Buffers::new(&part);
-    let mut still_buffers = feed.camera.background.as_ref().map(Buffers::new);
+    let memory_for = |part: &Rect| TrackerMemory::new(part.width, part.height);
+    let mut memory = memory_for(&part);
+    let mut still_memory = feed.camera.background.as_ref().map(memory_for);
     let (kept, ending) = keep_first(&mut feed);
     let whole = Region::whole(&part);
     let region = match feed.camera.part.is_none() {
@@ -148,7 +150,7 @@ fn run(mut feed: Feed, part: Rect, groups: Option<Group>, mut to: Outlet<FrameSh
         false => whole.clone(),
     };
     let note = (region != whole).then(|| told(&region, &feed.camera));
-    let ending = Lines::new(feed, part, &region, &mut buffers, still_buffers.as_mut()).and_then(
+    let ending = Lines::new(feed, part, &region, &mut memory, still_memory.as_mut()).and_then(
         |mut lines| {
             lines.binner = groups.map(Binner::new);
             lines.run(kept, ending, note, &mut to)
@@ -206,23 +208,22 @@ impl<'a> Lines<'a> {
         feed: Feed,
         part: Rect,
         region: &Region,
-        buffers: &'a mut Buffers,
-        still_buffers: Option<&'a mut Buffers>,
+        memory: &'a mut TrackerMemory,
+        still_memory: Option<&'a mut TrackerMemory>,
     ) -> Result<Self, Failure> {
         let camera = &feed.camera;
         let learn = LEARN_FRAMES as u16;
-        let engine = |part, buffers| {
-            Engine::new(part, camera.timing, camera.bits, learn, buffers, &feed.name)
-        };
+        let engine =
+            |part, memory| Engine::new(part, camera.timing, camera.bits, learn, memory, &feed.name);
         let columns = Rect {
             x: region.columns.start,
             width: region.columns.len(),
             ..part
         };
         let first = region.rows.start - part.y;
-        let moving = engine(columns, buffers)?.only_rows(first..first + region.rows.len());
-        let still = match (camera.background, still_buffers) {
-            (Some(part), Some(buffers)) => Some(engine(part, buffers)?),
+        let moving = engine(columns, memory)?.only_rows(first..first + region.rows.len());
+        let still = match (camera.background, still_memory) {
+            (Some(part), Some(memory)) => Some(engine(part, memory)?),
             _ => None,
         };
         Ok(Self {

@@ -23,9 +23,10 @@ use embassy_rp::uart::{self, BufferedInterruptHandler, BufferedUart};
 use embassy_rp::watchdog::Watchdog;
 use embassy_rp::{bind_interrupts, dma, i2c, peripherals, pio};
 use embassy_sync::zerocopy_channel::Channel;
+use rowtone::tracker::StaticStorage;
 use rowtone_pico2::boot::Boot;
 use rowtone_pico2::handover::{Filler, LineBuffer, Taker};
-use rowtone_pico2::memory::{SpectrumMemory, TrackerMemory};
+use rowtone_pico2::memory::SpectrumMemory;
 use rowtone_pico2::plan::{LIMITS, ROWS};
 use shared::M;
 use static_cell::{ConstStaticCell, StaticCell};
@@ -37,7 +38,7 @@ bind_interrupts!(struct Irqs {
 });
 
 /// Memory of the tracker.
-type Picture = TrackerMemory<
+type Picture = StaticStorage<
     { LIMITS.width as usize * ROWS as usize },
     { ROWS as usize },
     { LIMITS.width as usize },

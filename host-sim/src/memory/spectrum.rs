@@ -1,4 +1,4 @@
-//! The spectrum's memory on a machine that has plenty: vectors, sized for the window.
+//! The spectrum's memory.
 
 use rowtone::report::MAX_PEAKS;
 use rowtone::spectrum::{EstimatorStorage, FrameMark, SampleBuffer, Storage};

@@ -1,0 +1,48 @@
+//! The tracker's memory.
+
+use rowtone::reference::RowTable;
+use rowtone::tracker::{ColumnLearning, RowLearning, Storage};
+
+/// Vectors to lend to a [`rowtone::tracker::Tracker`].
+#[derive(Clone, Debug)]
+pub struct TrackerMemory {
+    coefficients: Vec<i8>,
+    tables: Vec<RowTable>,
+    mean: Vec<u16>,
+    learning: Vec<RowLearning>,
+    mask: Vec<u8>,
+    columns: Vec<ColumnLearning>,
+    fresh: Vec<i8>,
+    scratch: Vec<f32>,
+}
+
+impl TrackerMemory {
+    /// For a picture, or a part of one, of this size, px.
+    pub fn new(width: usize, rows: usize) -> Self {
+        Self {
+            coefficients: vec![0; width * rows],
+            tables: vec![RowTable::default(); rows],
+            mean: vec![0; width * rows],
+            learning: vec![RowLearning::default(); rows],
+            mask: vec![0; width],
+            columns: vec![ColumnLearning::default(); width],
+            fresh: vec![0; width],
+            scratch: vec![0.0; 2 * width],
+        }
+    }
+
+    /// Lends all of it, every column in use.
+    pub fn lend(&mut self) -> Storage<'_> {
+        self.mask.fill(u8::MAX);
+        Storage {
+            coefficients: &mut self.coefficients,
+            tables: &mut self.tables,
+            mean: &mut self.mean,
+            learning: &mut self.learning,
+            mask: &mut self.mask,
+            columns: &mut self.columns,
+            fresh: &mut self.fresh,
+            scratch: &mut self.scratch,
+        }
+    }
+}

@@ -1,0 +1,124 @@
+//! The memory that a tracker is lent.
+
+use super::{ColumnLearning, ConfigError, RowLearning};
+use crate::reference::RowTable;
+
+/// Memory of a tracker, lent by the caller: 3·width + 24 bytes a row, and 16 bytes a column. The line
+/// path itself reads width + 16 bytes a row.
+#[derive(Debug)]
+pub struct Storage<'a> {
+    /// width × rows: the coefficients of the inner products.
+    pub coefficients: &'a mut [i8],
+    /// rows: what the line path needs besides.
+    pub tables: &'a mut [RowTable],
+    /// width × rows: the reference picture, in counts.
+    pub mean: &'a mut [u16],
+    /// rows: what learning needs.
+    pub learning: &'a mut [RowLearning],
+    /// width: weight of each column, 0 = unused … 255. Kept as given, but for dead columns, which are
+    /// masked.
+    pub mask: &'a mut [u8],
+    /// width: what learning needs of the columns.
+    pub columns: &'a mut [ColumnLearning],
+    /// width: the coefficients of a row that is being built anew while its old ones still serve.
+    pub fresh: &'a mut [i8],
+    /// 2 × width: scratch of building coefficients.
+    pub scratch: &'a mut [f32],
+}
+
+impl Storage<'_> {
+    /// Cuts each buffer to what a picture of this size needs.
+    pub(super) fn cut(self, width: usize, rows: usize) -> Result<Self, ConfigError> {
+        let pixels = width * rows;
+        Ok(Self {
+            coefficients: cut("coefficients", self.coefficients, pixels)?,
+            tables: cut("tables", self.tables, rows)?,
+            mean: cut("mean", self.mean, pixels)?,
+            learning: cut("learning", self.learning, rows)?,
+            mask: cut("mask", self.mask, width)?,
+            columns: cut("columns", self.columns, width)?,
+            fresh: cut("fresh", self.fresh, width)?,
+            scratch: cut("scratch", self.scratch, 2 * width)?,
+        })
+    }
+}
+
+fn cut<'a, T>(
+    name: &'static str,
+    buffer: &'a mut [T],
+    needs: usize,
+) -> Result<&'a mut [T], ConfigError> {
+    let has = buffer.len();
+    buffer
+        .get_mut(..needs)
+        .ok_or(ConfigError::Buffer { name, has, needs })
+}
+
+/// Arrays of fixed size for [`Storage`]: a `static` on a microcontroller, a local in a test.
+///
+/// For pictures of up to `PIXELS` pixels, `ROWS` rows and `WIDTH` columns; smaller ones fit too. All zeros at first, so
+/// that a static lies in `.bss` and costs no flash.
+///
+/// ```
+/// use rowtone::{camera::Timing, tracker::{Config, StaticStorage, Tracker}};
+/// let mut storage = Box::new(StaticStorage::<{ 320 * 240 }, 240, 320>::new());
+/// assert!(core::mem::size_of_val(&*storage) <= 3 * 320 * 240 + 28 * 240 + 16 * 320);
+/// let config = Config::new(Timing::new(67_200_000, 500_000, 240)?, 320);
+/// let tracker = Tracker::new(config, storage.lend())?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+// The coefficients come first and at a whole word: where the width is a multiple of four, every row of
+// them lies so, and a Cortex-M loads two words at once.
+#[derive(Clone, Debug)]
+#[repr(C, align(8))]
+pub struct StaticStorage<const PIXELS: usize, const ROWS: usize, const WIDTH: usize> {
+    coefficients: [i8; PIXELS],
+    mean: [u16; PIXELS],
+    tables: [RowTable; ROWS],
+    learning: [RowLearning; ROWS],
+    mask: [u8; WIDTH],
+    columns: [ColumnLearning; WIDTH],
+    fresh: [i8; WIDTH],
+    scratch: [[f32; WIDTH]; 2],
+}
+
+impl<const PIXELS: usize, const ROWS: usize, const WIDTH: usize>
+    StaticStorage<PIXELS, ROWS, WIDTH>
+{
+    /// Empty memory.
+    pub const fn new() -> Self {
+        Self {
+            coefficients: [0; PIXELS],
+            mean: [0; PIXELS],
+            tables: [RowTable::EMPTY; ROWS],
+            learning: [RowLearning::EMPTY; ROWS],
+            mask: [0; WIDTH],
+            columns: [ColumnLearning::EMPTY; WIDTH],
+            fresh: [0; WIDTH],
+            scratch: [[0.0; WIDTH]; 2],
+        }
+    }
+
+    /// Lends all of it, every column in use.
+    pub fn lend(&mut self) -> Storage<'_> {
+        self.mask.fill(u8::MAX);
+        Storage {
+            coefficients: &mut self.coefficients,
+            tables: &mut self.tables,
+            mean: &mut self.mean,
+            learning: &mut self.learning,
+            mask: &mut self.mask,
+            columns: &mut self.columns,
+            fresh: &mut self.fresh,
+            scratch: self.scratch.as_flattened_mut(),
+        }
+    }
+}
+
+impl<const PIXELS: usize, const ROWS: usize, const WIDTH: usize> Default
+    for StaticStorage<PIXELS, ROWS, WIDTH>
+{
+    fn default() -> Self {
+        Self::new()
+    }
+}
