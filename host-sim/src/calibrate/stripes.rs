@@ -180,7 +180,8 @@ fn grown(
     let mut problem = Problem::new(rows, background);
     let mut first = start.model;
     first.harmonics.truncate(2);
-    let fit = problem.fit(&first, 8).ok_or(Refusal::NoStripes)?;
+    let mut fit = problem.fit(&first, 8).ok_or(Refusal::NoStripes)?;
+    outliers::trim(&mut problem, &mut fit);
     let most = limit(&fit, background);
     let mut fit = grow(&problem, fit, most, wanted);
     let left_out = outliers::leave_out(&mut problem, &mut fit, |problem, fit| {

@@ -78,7 +78,7 @@ struct Region {
 #[command(after_help = "\
 Columns: recordings in which all that was told is right (within 4 stated standard deviations), in which
 nothing was told, and in which something was wrong; rms of the line time's relative error, of its stated
-deviation, and of their ratio; the first reason of each kind.
+deviation, and of their ratio, with its 95 % range; the first reason of each kind.
 
 Example:
   rowtone sweep calibration --seeds 40 --only frame")]

@@ -205,6 +205,17 @@ impl Tally {
         self.counts[kind] += 1;
     }
 
+    /// Where the ratio's true rms lies with 95 %, were errors Gaussian: chi square by Wilson and Hilferty 1931.
+    fn ratio_range(&self) -> [f64; 2] {
+        let n = self.counts[0] as f64;
+        let [_, _, ratio] = self.rms();
+        let quantile = |z: f64| (1.0 - 2.0 / (9.0 * n) + z * (2.0 / (9.0 * n)).sqrt()).powi(3);
+        [1.96, -1.96].map(|z| match quantile(z) {
+            q if q > 0.0 => ratio / q.sqrt(),
+            _ => f64::INFINITY,
+        })
+    }
+
     /// Rms of the relative error, of the stated standard deviation, and of their ratio.
     pub fn rms(&self) -> [f64; 3] {
         self.sums
@@ -214,8 +225,8 @@ impl Tally {
 
 /// Head of the table, as Markdown.
 pub const HEAD: &str = "\
-| condition | right | refused | wrong | rms error (relative) | stated sd | error / sd (rms) | why |
-| :-- | --: | --: | --: | --: | --: | --: | :-- |";
+| condition | right | refused | wrong | rms error (relative) | stated sd | error / sd (rms) | 95 % | why |
+| :-- | --: | --: | --: | --: | --: | --: | --: | :-- |";
 
 /// One line of the table.
 ///
@@ -228,10 +239,32 @@ pub fn row(condition: &Condition, first: u64, seeds: u64) -> Result<String, SimE
     // Writing to a string cannot fail.
     if right > 0 {
         let [error, sd, ratio] = tally.rms();
-        let _ = write!(text, " {error:.1e} | {sd:.1e} | {ratio:.2} |");
+        let [least, most] = tally.ratio_range();
+        let _ = write!(
+            text,
+            " {error:.1e} | {sd:.1e} | {ratio:.2} | {least:.2}–{most:.2} |"
+        );
     } else {
-        text.push_str(" | | |");
+        text.push_str(" | | | |");
     }
     let _ = write!(text, " {} |", tally.reasons.join("; "));
     Ok(text)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Chi square of ten degrees of freedom: 3.25 to 20.48 with 95 %.
+    #[test]
+    fn the_range_is_that_of_chi_square() {
+        let tally = Tally {
+            counts: [10, 0, 0],
+            sums: [0.0, 0.0, 10.0],
+            ..Tally::default()
+        };
+        let [least, most] = tally.ratio_range();
+        assert!((least - (10.0_f64 / 20.48).sqrt()).abs() < 0.01, "{least}");
+        assert!((most - (10.0_f64 / 3.25).sqrt()).abs() < 0.02, "{most}");
+    }
 }
