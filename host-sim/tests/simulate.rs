@@ -178,3 +178,34 @@ fn a_picture_and_a_sound_become_a_clip() {
     assert_eq!(truth["config"]["motion"]["sound"]["amplitude_px"], 0.3);
     assert_eq!(truth["config"]["scene"]["kind"], "picture");
 }
+
+/// Of a calibration all that was measured is taken, and options go before it.
+#[test]
+fn a_calibration_gives_the_camera() {
+    let place = Place::new("calibrated");
+    let toml = "rows = 64\nline_time_s = 3.367e-5\nframe_period_s = 0.02\nexposure_s = 2e-4\nrolling = \"up\"\n";
+    std::fs::write(place.0.join("c.toml"), toml).unwrap();
+    let of = |options: &str| {
+        let done = place.simulate(&format!(
+            "--calibration c.toml {options} -o c.y4m --truth c.json"
+        ));
+        assert!(done.status.success(), "{done:?}");
+        let truth = place.truth("c.json");
+        ["line_time_us", "exposure_us", "fps", "rows"].map(|key| truth[key].as_f64())
+    };
+    let near = |found: [Option<f64>; 4], wanted: [f64; 4]| {
+        for (found, wanted) in found.iter().zip(wanted) {
+            assert!((found.unwrap() - wanted).abs() < 1e-6, "{found:?} {wanted}");
+        }
+    };
+    near(of("--frames 3"), [33.67, 200.0, 50.0, 64.0]);
+    near(
+        of("--frames 3 --size 32x48 --fps 40 --line-time-us 30 --exposure-us 10"),
+        [30.0, 10.0, 40.0, 48.0],
+    );
+    std::fs::write(place.0.join("c.toml"), "rows = 64\nline_time_s = -1\n").unwrap();
+    let done = place.simulate("--calibration c.toml -o c.y4m");
+    let said = String::from_utf8(done.stderr).unwrap();
+    assert_eq!(done.status.code(), Some(1), "{said}");
+    assert!(said.contains("c.toml: line 2: line_time_s"), "{said}");
+}

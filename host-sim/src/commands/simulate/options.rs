@@ -11,7 +11,8 @@ const EXAMPLES: &str = "\
 Examples:
   rowtone simulate --preset ov5647 --tone 49.2:0.4 --tone 296.7:0.02 --seconds 2 -o clip.y4m --truth clip.json
   rowtone simulate --scene photo --chirp 100:1000:10:0.5 --seconds 10 -o - | rowtone analyze - --line-time-us 40
-  rowtone simulate --scene plain --led 1000 --blur-px 0 --frames 30 -o led.y4m";
+  rowtone simulate --scene plain --led 1000 --blur-px 0 --frames 30 -o led.y4m
+  rowtone simulate --size 640x480 --calibration calibration.toml --tone 49.2:0.4 -o clip.y4m";
 
 /// Options of `rowtone simulate`.
 #[derive(Clone, Debug, clap::Args)]
@@ -64,6 +65,10 @@ struct CameraOptions {
     /// Time from one row to the next, µs
     #[arg(long, value_name = "T", conflicts_with = "global_shutter")]
     line_time_us: Option<f64>,
+    /// Line time, exposure, frame rate and rolling direction as `rowtone calibrate -o` measured them, where it could tell
+    /// them; the options here go before it
+    #[arg(long, value_name = "FILE", conflicts_with = "global_shutter")]
+    calibration: Option<PathBuf>,
     /// All rows are exposed at once
     #[arg(long)]
     global_shutter: bool,

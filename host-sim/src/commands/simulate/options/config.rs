@@ -1,6 +1,9 @@
 //! The configuration that the options ask for.
 
+use std::path::Path;
+
 use super::{Args, CameraOptions, SceneOptions};
+use crate::calibrate::{self, file::RollingName};
 use crate::commands::simulate::forms;
 use crate::failure::Failure;
 use crate::sim::{Config, Led, Optics, Preset, Scene, Sensor, Sound};
@@ -89,6 +92,11 @@ impl CameraOptions {
             .preset
             .map_or_else(|| Config::default().sensor, Preset::sensor);
         (s.cols, s.rows) = self.size.unwrap_or((s.cols, s.rows));
+        let measured = self.calibration.as_deref().map(Calibration::of);
+        let measured = measured.transpose()?;
+        if let Some(c) = &measured {
+            c.put_into(&mut s, self.size.is_some())?;
+        }
         s.fps = self.fps.unwrap_or(s.fps);
         if let Some(us) = self.line_time_us {
             s.line_time_ps = whole(us * 1e6, "--line-time-us", us)?;
@@ -102,8 +110,48 @@ impl CameraOptions {
         s.bits = self.bits.unwrap_or(s.bits);
         s.full_well_e = self.full_well.unwrap_or(s.full_well_e);
         s.read_noise_e = self.read_noise.unwrap_or(s.read_noise_e);
-        s.bottom_up = self.bottom_up;
+        s.bottom_up |= self.bottom_up;
         Ok(s)
+    }
+}
+
+/// A camera's timing as it was measured, and where that stands.
+struct Calibration<'a> {
+    path: &'a Path,
+    found: calibrate::Calibration,
+}
+
+impl<'a> Calibration<'a> {
+    fn of(path: &'a Path) -> Result<Self, Failure> {
+        let found = calibrate::Calibration::read(path)
+            .map_err(|error| Failure::input(format!("{}: {error}", path.display())))?;
+        Ok(Self { path, found })
+    }
+
+    /// The rows too, unless a `sized` picture was asked for. What was not measured stays as it is.
+    fn put_into(&self, sensor: &mut Sensor, sized: bool) -> Result<(), Failure> {
+        let timing = self
+            .found
+            .timing()
+            .map_err(|error| Failure::input(format!("{}: {error}", self.path.display())))?;
+        sensor.line_time_ps = timing.line_time_ps();
+        if !sized {
+            sensor.rows = self.found.rows;
+        }
+        if self.found.exposure_s.is_some() {
+            sensor.exposure_ns = timing.exposure_ns();
+        }
+        if let Some(period_s) = self.found.frame_period_s {
+            if !(period_s.is_finite() && period_s > 0.0) {
+                return Err(Failure::input(format!(
+                    "{}: frame_period_s = {period_s} is impossible: correct it, or give none",
+                    self.path.display()
+                )));
+            }
+            sensor.fps = 1.0 / period_s;
+        }
+        sensor.bottom_up |= self.found.rolling == Some(RollingName::Up);
+        Ok(())
     }
 }
 
