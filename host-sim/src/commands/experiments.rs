@@ -27,6 +27,12 @@ pub struct Args {
     /// Columns of the single tones' pictures; the thesis's camera had 1040
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(48..=1040))]
     pub cols: Option<u32>,
+    /// Columns of ramp, music, speech and phone; 1040 take sixteen times as long as 64
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(48..=1040))]
+    pub sound_cols: Option<u32>,
+    /// Which recordings of ramp, music, speech and phone: their surface and noise
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub seed: u64,
     /// Amplitude of the single tones, px
     #[arg(long, value_name = "A", default_value_t = 0.5)]
     pub amplitude_px: f64,
@@ -67,6 +73,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         Scale::USUAL
     };
     scale.tone_cols = args.cols.unwrap_or(scale.tone_cols);
+    scale.sound_cols = args.sound_cols.unwrap_or(scale.sound_cols);
+    scale.seed = args.seed;
     if wanted(Experiment::Filling) {
         folder.table("filling.md", &table::markdown())?;
         filled_sounds(&folder)?;

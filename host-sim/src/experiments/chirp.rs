@@ -48,7 +48,7 @@ fn followed(sound: &Sound, ramp: &Chirp) -> (f64, f64) {
 /// # Errors
 /// [`Failure`] for what cannot be simulated or written.
 pub fn run(folder: &Folder, scale: Scale) -> Result<(), Failure> {
-    let setup = Setup::thesis(scale.sound_cols, scale.sound_frames, 1);
+    let setup = Setup::thesis(scale.sound_cols, scale.sound_frames, scale.seed);
     let ramp = ramp(f64::from(scale.sound_frames) / setup.sensor.fps);
     let motion = Motion {
         chirps: vec![ramp],
@@ -56,10 +56,10 @@ pub fn run(folder: &Folder, scale: Scale) -> Result<(), Failure> {
     };
     let film = setup.film(&motion)?;
     let mut text = format!(
-        "Ramp from 100 to 1000 Hz in {:.2} s, 0.5 px, {}x1048 at 120 fps, gaps filled, below 1000 Hz, seed 1; \
+        "Ramp from 100 to 1000 Hz in {:.2} s, 0.5 px, {}x1048 at 120 fps, gaps filled, below 1000 Hz, seed {}; \
          strongest frequency of windows of {WINDOW_S} s\n\n\
          | method | SNR, dB | windows off by more than {WRONG_HZ} Hz | rms error of the others, Hz |\n| --- | --: | --: | --: |\n",
-        ramp.duration_s, scale.sound_cols
+        ramp.duration_s, scale.sound_cols, scale.seed
     );
     let mut panels = Vec::new();
     for (name, heard) in all(&film, "chirp") {

@@ -37,6 +37,8 @@ pub struct Scale {
     pub sound_cols: u32,
     /// Frames of chirp, music and speech, 120 a second.
     pub sound_frames: u32,
+    /// Which recordings these are.
+    pub seed: u64,
 }
 
 impl Scale {
@@ -45,12 +47,14 @@ impl Scale {
         tone_cols: 1040,
         sound_cols: 64,
         sound_frames: 240,
+        seed: 1,
     };
     /// A look at it: a minute.
     pub const QUICK: Self = Self {
         tone_cols: 64,
         sound_cols: 48,
         sound_frames: 40,
+        seed: 1,
     };
 }
 

@@ -11,8 +11,8 @@ use crate::restore::sounds;
 use crate::sim::{Motion, Tone};
 
 /// The phone's camera.
-fn setup(cols: u32, frames: u32) -> Setup {
-    let mut setup = Setup::thesis(cols, frames, 1);
+fn setup(cols: u32, frames: u32, seed: u64) -> Setup {
+    let mut setup = Setup::thesis(cols, frames, seed);
     let sensor = &mut setup.sensor;
     (sensor.rows, sensor.fps) = (720, 30.0);
     (sensor.line_time_ps, sensor.exposure_ns) = (27_777_778, 250_000);
@@ -26,10 +26,10 @@ fn setup(cols: u32, frames: u32) -> Setup {
 /// [`Failure`] for what cannot be simulated or written.
 pub fn run(folder: &Folder, scale: Scale) -> Result<(), Failure> {
     let mut text = format!(
-        "30 fps, {}x720, 27.8 µs a row (40 % blank), exposed for 0.25 ms. Tones of 0.3 px, 30 frames, seed 1\n\n\
+        "30 fps, {}x720, 27.8 µs a row (40 % blank), exposed for 0.25 ms. Tones of 0.3 px, 30 frames, seed {}\n\n\
          | Hz | method | noise / bound | amplitude | frequency error, Hz | largest ghost at ±30, 60, 90 Hz |\n\
          | --: | --- | --: | --: | --: | --: |\n",
-        scale.sound_cols
+        scale.sound_cols, scale.seed
     );
     // None a multiple of 30: that stands still in the picture and cannot be seen.
     for hz in [83.0, 217.0, 437.0] {
@@ -42,7 +42,7 @@ pub fn run(folder: &Folder, scale: Scale) -> Result<(), Failure> {
             tones: vec![tone],
             ..Motion::default()
         };
-        let film = setup(scale.sound_cols, 30).film(&motion)?;
+        let film = setup(scale.sound_cols, 30, scale.seed).film(&motion)?;
         for method in film.methods() {
             working_on(&format!("phone: {hz} Hz, {}", method.name()));
             let s = score(method.as_ref(), &film.recording, hz);
@@ -61,7 +61,7 @@ pub fn run(folder: &Folder, scale: Scale) -> Result<(), Failure> {
         }
     }
     let _ = write!(text, "\n{} frames. {HEAD}", scale.sound_frames / 4);
-    let setup = setup(scale.sound_cols, scale.sound_frames / 4);
+    let setup = setup(scale.sound_cols, scale.sound_frames / 4, scale.seed);
     for (name, sound) in [
         ("phone-music", sounds::music()),
         ("phone-speech", sounds::speech()),
