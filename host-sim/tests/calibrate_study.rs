@@ -8,6 +8,10 @@ use host_sim::calibrate::study::{self, Outcome, Tally, condition};
 fn the_hard_ones_are_right_or_refused() {
     let all = condition::all();
     for (name, relative) in [
+        ("LED 1 kHz, one second", Some(1e-5)),
+        ("500 Hz", Some(1e-5)),
+        ("2 kHz, exposure 100 µs", Some(1e-5)),
+        ("1080 rows of 14.6 µs", Some(1e-5)),
         ("saturated", Some(1e-5)),
         ("low contrast (off: 90 %)", Some(1e-4)),
         ("very low contrast (off: 99 %)", Some(1e-3)),
