@@ -5,7 +5,7 @@
 //! distribution of the same variance, sin(x)/x with x² = 3ω²·variance: exact where all rows know the same, and else
 //! off by the fourth cumulant only.
 
-use microfft::Complex32 as Complex;
+use num_complex::Complex32 as Complex;
 
 use crate::timeline::Spread;
 

@@ -4,9 +4,8 @@
 //! compared by the energy that a tone there would have left after the projection: divided by the kernel of the
 //! spreading and by c(f). This only proposes; whether a tone is there is decided by the joint fit with exact times.
 
-use microfft::Complex32 as Complex;
-
 use super::fit::Model;
+use super::fourier::energies;
 use super::model::Samples;
 use super::phase::{Frequency, cos_sin, sin};
 use super::storage::MAX_GRID;
@@ -89,7 +88,7 @@ pub(crate) fn candidates(
         samples.tabulate(i + 1, tone);
     }
     spread(samples, model, points, g);
-    let Some(bins) = transform(points) else {
+    let Some(bins) = energies(points) else {
         return found;
     };
     let bin_hz = g.bin_hz();
@@ -99,7 +98,7 @@ pub(crate) fn candidates(
     if first > last {
         return found;
     }
-    let (mut here, mut after) = (bins[first - 1].norm_sqr(), bins[first].norm_sqr());
+    let (mut here, mut after) = (bins[first - 1], bins[first]);
     // No peak lower than this can be a candidate any more: the kernel only falls with frequency, and a parabola's
     // vertex is at most an eighth above its highest point.
     let mut too_low = 0.0;
@@ -111,7 +110,7 @@ pub(crate) fn candidates(
     for b in first..=last {
         let before = here;
         here = after;
-        after = bins[b + 1].norm_sqr();
+        after = bins[b + 1];
         // Written so that a NaN is no peak.
         if !(here > before && here >= after) {
             continue;
@@ -220,25 +219,4 @@ fn spread(samples: &mut Samples<'_>, model: &Model, points: &mut [f32], g: Grid)
             points[cell + 1] += x * share;
         }
     }
-}
-
-fn transform(points: &mut [f32]) -> Option<&mut [Complex]> {
-    use microfft::real;
-    macro_rules! by_size {
-        ($($(#[$only:meta])? $size:literal => $fft:ident),*) => {
-            match points.len() {
-                $($(#[$only])? $size => {
-                    let points: &mut [f32; $size] = points.try_into().ok()?;
-                    Some(&mut real::$fft(points)[..])
-                })*
-                _ => None,
-            }
-        };
-    }
-    by_size!(
-        64 => rfft_64, 128 => rfft_128, 256 => rfft_256, 512 => rfft_512, 1024 => rfft_1024,
-        2048 => rfft_2048, 4096 => rfft_4096, 8192 => rfft_8192,
-        #[cfg(feature = "grid-32768")] 16384 => rfft_16384,
-        #[cfg(feature = "grid-32768")] 32768 => rfft_32768
-    )
 }

@@ -1,6 +1,6 @@
 //! The joint fit: offsets, drift and all tones at once, refined together (Gauss–Newton).
 
-use microfft::Complex32 as Complex;
+use num_complex::Complex32 as Complex;
 
 use super::cholesky::{MOST, Normal};
 use super::gram::{Regressors, Unknown};

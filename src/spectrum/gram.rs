@@ -5,7 +5,7 @@
 //! offsets is removing a mean over frames. The samples' true weights enter the residual and its products
 //! ([`super::model`]), so the fit's fixed point is exact; only its way there and the stated deviations use this.
 
-use microfft::Complex32 as Complex;
+use num_complex::Complex32 as Complex;
 
 use super::cholesky::{MOST, Normal};
 use super::model::{POWERS, Samples, Tone};

@@ -22,6 +22,7 @@ mod detect;
 mod estimator;
 mod fit;
 mod follow;
+mod fourier;
 mod gram;
 mod load;
 mod model;

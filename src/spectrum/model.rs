@@ -1,6 +1,6 @@
 //! Tones, their phasor tables, and the one pass over the samples that everything else is made of.
 
-use microfft::Complex32 as Complex;
+use num_complex::Complex32 as Complex;
 
 use super::blur::blur;
 use super::phase::{Frequency, cos_sin, turns};

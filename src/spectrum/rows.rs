@@ -6,7 +6,7 @@
 //! (Its fused multiply-add would save a quarter more, but stable Rust without `std` has no way to ask for it: the
 //! function is in `std` and assembly may not name the registers.)
 
-use microfft::Complex32 as Complex;
+use num_complex::Complex32 as Complex;
 
 use super::window::unpack_weight;
 

@@ -1,6 +1,6 @@
 //! One more tone at a time, until the next is no more than noise would be.
 
-use microfft::Complex32 as Complex;
+use num_complex::Complex32 as Complex;
 
 use super::alarm;
 use super::detect::{self, Band, Candidate};
