@@ -1,0 +1,91 @@
+#!/usr/bin/env python3
+"""The deepest stack below functions of a firmware, bytes, from its disassembly (Armv8-M, llvm-objdump).
+
+    boards/stack.py ELF NAME...
+
+NAME is a part of a mangled name. Each function's pushed words and `sub sp` are summed over what it calls; the path is
+printed with -v first. A call through a pointer may reach every function of formatting, writing and waking that nobody
+calls by name, each once on a path. What only a panic runs is left out: ask for rust_begin_unwind. The words that the
+processor pushes for an interrupt come on top (104 bytes with floating point).
+"""
+
+import re
+import subprocess
+import sys
+
+PANIC = re.compile(r"panicking|index_fail|mismatch_fail|unwrap_failed|expect_failed|panic_already|rust_begin_unwind")
+FUNCTION = re.compile(r"^[0-9a-f]+ <(.*)>:$")
+CALL = re.compile(r"^(bl|b|b\.w|b\w\w\.w)\s.*<(.+?)>(?: @.*)?$")
+
+
+def registers(text):
+    n = 0
+    for part in text.split(","):
+        ends = [int(e) for e in re.findall(r"[rsd](\d+)", part)]
+        n += ends[1] - ends[0] + 1 if len(ends) == 2 else 1
+    return n
+
+
+def read(elf):
+    text = subprocess.run(
+        ["llvm-objdump", "-d", "--no-show-raw-insn", "--mcpu=cortex-m33", elf], capture_output=True, text=True, check=True
+    ).stdout
+    frames, calls, pointer = {}, {}, set()
+    name = None
+    for line in text.splitlines():
+        if match := FUNCTION.match(line):
+            if match[1].startswith("$"):
+                continue
+            name = match[1]
+            frames.setdefault(name, 0)
+            calls.setdefault(name, set())
+            continue
+        parts = line.split("\t", 1)
+        if name is None or len(parts) < 2:
+            continue
+        code = parts[1].replace("\t", " ").strip()
+        if match := re.match(r"(push|vpush|stmdb sp!,)\S*\s*\{(.*)\}", code):
+            frames[name] += registers(match[2]) * (8 if "d" in match[2] else 4)
+        elif match := re.match(r"str\S* .*\[sp, #-(\d+)\]!", code):
+            frames[name] += int(match[1])
+        elif match := re.match(r"subw?(?:\.w)? sp, (?:sp, )?#(\d+)", code):
+            frames[name] += int(match[1])
+        elif re.match(r"blx r|bx r", code):
+            pointer.add(name)
+        elif (match := CALL.match(code)) and "+0x" not in match[2] and match[2] != name:
+            calls[name].add(match[2])
+    return frames, calls, pointer
+
+
+def main():
+    arguments = sys.argv[1:]
+    verbose = arguments[:1] == ["-v"]
+    elf, *wanted = arguments[verbose:]
+    frames, calls, pointer = read(elf)
+    called = set().union(*calls.values())
+    free = {f for f in frames if re.search(r"3fmt|5Write|5waker", f) and f not in called}
+    known = {}
+
+    def deepest(name, path):
+        if name in path:
+            return 0, []
+        if name in known:
+            return known[name]
+        best = (0, [])
+        for callee in calls.get(name, set()) | (free if name in pointer else set()):
+            if not PANIC.search(callee):
+                best = max(best, deepest(callee, path | {name}))
+        result = (best[0] + frames.get(name, 0), [name, *best[1]])
+        known[name] = result
+        return result
+
+    for part in wanted:
+        for name in sorted(f for f in frames if part in f):
+            known.clear()
+            bytes_, path = deepest(name, frozenset())
+            print(f"{bytes_} {name}")
+            for step in path if verbose else []:
+                print(f"    {frames.get(step, 0):5} {step}")
+
+
+main()
