@@ -72,6 +72,8 @@ fn run(args: &Args, uart: &mut Uart) -> Result<(), Failure> {
         timing,
         per_line: Count::default(),
         per_spectrum: Count::default(),
+        per_learning_line: Count::default(),
+        per_round: Count::default(),
         spectrum_stack_bytes: 0,
         encode_stack_bytes: 0,
         stack_bytes: 0,
@@ -103,6 +105,9 @@ struct Board<'a> {
     timing: Timing,
     per_line: Count,
     per_spectrum: Count,
+    per_learning_line: Count,
+    /// What ends a round of learning.
+    per_round: Count,
     /// Stack of computing a window, and of writing its report.
     spectrum_stack_bytes: usize,
     encode_stack_bytes: usize,
@@ -120,10 +125,18 @@ impl Board<'_> {
                 if line.frame >= LEARN_FRAMES {
                     break;
                 }
+                let start = self.counter.as_ref().map(Counter::start);
                 // It gives nothing yet.
                 self.tracker.push_into(&line, &mut self.binner);
+                if let (Some(counter), Some(start)) = (&self.counter, start) {
+                    self.per_learning_line.add(counter.instructions(start));
+                }
             }
+            let start = self.counter.as_ref().map(Counter::start);
             self.tracker.end_round();
+            if let (Some(counter), Some(start)) = (&self.counter, start) {
+                self.per_round.add(counter.instructions(start));
+            }
             self.lines.rewind()?;
         }
         Ok(())
@@ -182,7 +195,8 @@ impl Board<'_> {
             self.uart,
             "insn_per_line={} max_insn_per_line={} insn_per_spectrum={} stack_max_bytes={} ram_static_bytes={} \
              flash_bytes={} min_insn_per_line={} max_insn_per_spectrum={} \
-             spectrum_stack_bytes={} encode_stack_bytes={}",
+             spectrum_stack_bytes={} encode_stack_bytes={} insn_per_learning_line={} max_insn_per_learning_line={} \
+             max_insn_per_round={}",
             self.per_line.mean(),
             self.per_line.max(),
             self.per_spectrum.mean(),
@@ -193,6 +207,9 @@ impl Board<'_> {
             self.per_spectrum.max(),
             self.spectrum_stack_bytes,
             self.encode_stack_bytes,
+            self.per_learning_line.mean(),
+            self.per_learning_line.max(),
+            self.per_round.max(),
         );
     }
 }

@@ -41,11 +41,13 @@ impl Counter {
     }
 
     /// The point from which on instructions count.
+    #[inline(always)]
     pub fn start(&self) -> Start {
         Start(ticks())
     }
 
     /// Instructions since `start`.
+    #[inline(always)]
     pub fn instructions(&self, start: Start) -> u64 {
         (ticks() - start.0).saturating_sub(self.overhead_ticks) * 100 / TICKS_100
     }
