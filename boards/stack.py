@@ -4,8 +4,9 @@
     boards/stack.py ELF NAME...
 
 NAME is a part of a mangled name. Each function's pushed words and `sub sp` are summed over what it calls; the path is
-printed with -v first. A call through a pointer may reach every function of formatting, writing and waking that nobody
-calls by name, each once on a path. What only a panic runs is left out: ask for rust_begin_unwind. The words that the
+printed with -v first. A call through a pointer in embassy may reach every waker, elsewhere every function
+of formatting and writing, that nobody calls by name. Functions that reach each other count once each, all together.
+What only a panic runs is left out: ask for rust_begin_unwind. The words that the
 processor pushes for an interrupt come on top (104 bytes with floating point).
 """
 
@@ -63,29 +64,42 @@ def main():
     elf, *wanted = arguments[verbose:]
     frames, calls, pointer = read(elf)
     called = set().union(*calls.values())
-    free = {f for f in frames if re.search(r"3fmt|5Write|5waker", f) and f not in called}
-    known = {}
+    free = sorted(f for f in frames if f not in called)
+    wakers = {f for f in free if re.search(r"5waker|_wake", f)}
+    writers = {f for f in free if re.search(r"3fmt|5Write", f)} - wakers
+    edges = {}
+    for name in frames:
+        by_pointer = (wakers if "embassy" in name else writers) if name in pointer else set()
+        edges[name] = sorted(f for f in calls[name] | by_pointer if f in frames and not PANIC.search(f))
 
-    def deepest(name, path):
-        if name in path:
-            return 0, []
-        if name in known:
-            return known[name]
-        best = (0, [])
-        for callee in calls.get(name, set()) | (free if name in pointer else set()):
-            if not PANIC.search(callee):
-                best = max(best, deepest(callee, path | {name}))
-        result = (best[0] + frames.get(name, 0), [name, *best[1]])
-        known[name] = result
-        return result
+    # Functions that reach each other count together, all their frames: no order of them takes more.
+    number, low, stack, group, deepest = {}, {}, [], {}, {}
+
+    def visit(name):
+        number[name] = low[name] = len(number)
+        stack.append(name)
+        for callee in edges[name]:
+            if callee not in number:
+                visit(callee)
+            if callee not in group:
+                low[name] = min(low[name], low[callee])
+        if low[name] == number[name]:
+            at = stack.index(name)
+            members = stack[at:]
+            del stack[at:]
+            group.update(dict.fromkeys(members, name))
+            below = max((deepest[group[c]] for m in members for c in edges[m] if group[c] != name), default=(0, []))
+            own = sum(frames[m] for m in members)
+            deepest[name] = (own + below[0], [*((frames[m], m) for m in members), *below[1]])
 
     for part in wanted:
         for name in sorted(f for f in frames if part in f):
-            known.clear()
-            bytes_, path = deepest(name, frozenset())
-            print(f"{bytes_} {name}")
-            for step in path if verbose else []:
-                print(f"    {frames.get(step, 0):5} {step}")
+            if name not in number:
+                visit(name)
+            total, path = deepest[group[name]]
+            print(total, name)
+            for own, step in path if verbose else []:
+                print(f"    {own:5} {step}")
 
 
 main()
