@@ -10,17 +10,17 @@ use rowtone::analyzer::{Analyzer, Collector, Reporter};
 use rowtone::camera::{Line, Pixels, Timing};
 use rowtone::kernel::Kernel;
 use rowtone::link::Link;
-use rowtone::outbox::Outbox;
 use rowtone::report::Report;
-use rowtone::settings::store::{Nowhere, Started};
-use rowtone::settings::{Board, Console, Limits, Settings, Wire};
+use rowtone::settings::Wire;
+use rowtone::settings::store::Nowhere;
 use rowtone::spectrum;
 use rowtone::timeline::{Binner, Group};
 use rowtone::tracker::{self, Config, Outcome, Tracker};
-use rowtone::wire::{Message, SettingsOrigin, binary, text};
+use rowtone::wire::{Message, binary, text};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 use std::f32::consts::TAU;
+use wire_common::console::link;
 use wire_common::ordinary_report;
 
 thread_local! {
@@ -213,33 +213,6 @@ fn nothing_is_allocated_from_lines_to_bytes() {
         assert_eq!(calls, 0, "{wire:?}");
         assert!(said > 0, "{wire:?} said nothing");
     }
-}
-
-fn link(slots: &mut [Option<Report>], wire: Wire) -> Link<'_> {
-    let board = Board {
-        version: [0, 1, 0],
-        limits: Limits {
-            width: 320,
-            height: 240,
-            min_width: 16,
-            max_window_s: 10.0,
-        },
-        defaults: Settings {
-            wire,
-            unit: 1,
-            ..Settings::default()
-        },
-    };
-    let started = Started {
-        session: 1,
-        settings: None,
-        origin: SettingsOrigin::Defaults,
-    };
-    Link::new(
-        Console::new(board, started).unwrap(),
-        Outbox::new(slots),
-        115_200,
-    )
 }
 
 /// Sends all that the board has to say; the number of bytes.

@@ -6,30 +6,14 @@ use proptest::prelude::*;
 use rowtone::outbox::Outbox;
 use rowtone::report::Report;
 use rowtone::settings::command::LineReader;
-use rowtone::settings::store::{Nowhere, Started};
-use rowtone::settings::{Board, Console, Limits, Region, Settings};
+use rowtone::settings::store::Nowhere;
+use rowtone::settings::{Console, Region, Settings};
 use rowtone::wire::{Message, Reply, SettingsOrigin, text};
+use wire_common::console::LIMITS;
 use wire_common::ordinary_report;
 
-const LIMITS: Limits = Limits {
-    width: 320,
-    height: 240,
-    min_width: 16,
-    max_window_s: 10.0,
-};
-
 fn console() -> Console {
-    let board = Board {
-        version: [0, 1, 0],
-        limits: LIMITS,
-        defaults: Settings::default(),
-    };
-    let started = Started {
-        session: 7,
-        settings: None,
-        origin: SettingsOrigin::Defaults,
-    };
-    Console::new(board, started).unwrap()
+    wire_common::console::console(7, Settings::default(), SettingsOrigin::Defaults)
 }
 
 /// Four reports, numbers 0 to 5 seen, 2 to 5 kept, all sent.
@@ -174,7 +158,7 @@ fn a_program_uses_a_checksum() {
 #[test]
 fn status_and_version() {
     let mut console = console();
-    assert_eq!(say(&mut console, "version").text, "rowtone 0.1.0 wire 1");
+    assert_eq!(say(&mut console, "version").text, "rowtone 1.2.3 wire 1");
     say(&mut console, "nonsense");
     let mut slots = [const { None }; 4];
     let said = console.carry_out("status", 5000, &mut full(&mut slots), &mut Nowhere);

@@ -3,38 +3,11 @@
 mod wire_common;
 
 use rowtone::link::Link;
-use rowtone::outbox::Outbox;
-use rowtone::report::Report;
-use rowtone::settings::store::{Nowhere, Started};
-use rowtone::settings::{Board, Console, Limits, Settings, Wire};
-use rowtone::wire::{Arrival, Message, Sequence, SettingsOrigin, binary, text};
+use rowtone::settings::Wire;
+use rowtone::settings::store::Nowhere;
+use rowtone::wire::{Arrival, Message, Sequence, binary, text};
+use wire_common::console::link;
 use wire_common::{Dice, harm, ordinary_report};
-
-fn link(slots: &mut [Option<Report>], wire: Wire) -> Link<'_> {
-    let board = Board {
-        version: [0, 1, 0],
-        limits: Limits {
-            width: 320,
-            height: 240,
-            min_width: 16,
-            max_window_s: 10.0,
-        },
-        defaults: Settings {
-            wire,
-            ..Settings::default()
-        },
-    };
-    let started = Started {
-        session: 1,
-        settings: None,
-        origin: SettingsOrigin::Defaults,
-    };
-    Link::new(
-        Console::new(board, started).unwrap(),
-        Outbox::new(slots),
-        115_200,
-    )
-}
 
 /// All that the board has to say, without waiting.
 fn drain(link: &mut Link<'_>) -> Vec<u8> {

@@ -5,8 +5,8 @@ mod wire_common;
 use proptest::prelude::*;
 use rmodbus::{ModbusProto, client::ModbusRequest};
 use rowtone::report::Report;
-use rowtone::settings::store::{Keep, Nowhere, SaveError, Started};
-use rowtone::settings::{Board, Console, Limits, Region, Settings, Wire};
+use rowtone::settings::store::{Keep, Nowhere, SaveError};
+use rowtone::settings::{Console, Region, Settings, Wire};
 use rowtone::wire::modbus::{State, answer, decode_report};
 use rowtone::wire::{SettingsOrigin, Status};
 use wire_common::ordinary_report;
@@ -23,26 +23,12 @@ const STATUS: Status = Status {
 };
 
 fn console() -> Console {
-    let board = Board {
-        version: [1, 2, 3],
-        limits: Limits {
-            width: 320,
-            height: 240,
-            min_width: 16,
-            max_window_s: 10.0,
-        },
-        defaults: Settings {
-            unit: 9,
-            wire: Wire::Modbus,
-            ..Settings::default()
-        },
+    let defaults = Settings {
+        unit: 9,
+        wire: Wire::Modbus,
+        ..Settings::default()
     };
-    let started = Started {
-        session: 1,
-        settings: None,
-        origin: SettingsOrigin::Saved,
-    };
-    Console::new(board, started).unwrap()
+    wire_common::console::console(1, defaults, SettingsOrigin::Saved)
 }
 
 /// Keeps the last settings saved.

@@ -5,6 +5,8 @@
     reason = "each test program uses its part of this"
 )]
 
+pub mod console;
+
 use proptest::{collection, option, prelude::*, sample};
 use rowtone::report::{MAX_PEAKS, Peak, Report, Warnings};
 use rowtone::wire::{MAX_VALUE, Message, REPLY_LEN, Reply, SettingsOrigin, Status};

@@ -9,9 +9,11 @@ use rmodbus::{ModbusProto, client::ModbusRequest};
 use rowtone::link::Link;
 use rowtone::outbox::Outbox;
 use rowtone::report::Report;
-use rowtone::settings::store::{Nowhere, Started};
-use rowtone::settings::{Board, Console, Limits, Settings, Wire};
+use rowtone::settings::store::Nowhere;
+use rowtone::settings::{Settings, Wire};
 use rowtone::wire::SettingsOrigin;
+
+use crate::wire_common::console::console;
 
 /// The server's address.
 pub const UNIT: u8 = 9;
@@ -28,33 +30,14 @@ pub struct Server<'a> {
 
 impl<'a> Server<'a> {
     pub fn new(slots: &'a mut [Option<Report>], baud: u32) -> Self {
-        let limits = Limits {
-            width: 320,
-            height: 240,
-            min_width: 16,
-            max_window_s: 10.0,
-        };
         let defaults = Settings {
             unit: UNIT,
             wire: Wire::Modbus,
             ..Settings::default()
         };
-        let board = Board {
-            version: [1, 2, 3],
-            limits,
-            defaults,
-        };
-        let started = Started {
-            session: 7,
-            settings: None,
-            origin: SettingsOrigin::Defaults,
-        };
+        let console = console(7, defaults, SettingsOrigin::Defaults);
         Self {
-            link: Link::new(
-                Console::new(board, started).unwrap(),
-                Outbox::new(slots),
-                baud,
-            ),
+            link: Link::new(console, Outbox::new(slots), baud),
             now_us: 0,
             byte_us: 11_000_000 / u64::from(baud),
         }

@@ -2,6 +2,9 @@
 //! what passes.
 #![allow(dead_code, reason = "each test file uses some of it")]
 
+#[path = "../../../tests/wire_common/console.rs"]
+mod console;
+
 use std::io::{ErrorKind, Read, Write};
 use std::os::fd::AsRawFd;
 use std::sync::Arc;
@@ -10,12 +13,10 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use nix::fcntl::{FcntlArg, FdFlag, fcntl};
-use rowtone::link::Link;
-use rowtone::outbox::Outbox;
 use rowtone::report::{Peak, Report, Warnings};
-use rowtone::settings::store::{Nowhere, Started};
-use rowtone::settings::{self, Console, Limits, Settings, Wire};
-use rowtone::wire::{Message, SettingsOrigin, text};
+use rowtone::settings::Wire;
+use rowtone::settings::store::Nowhere;
+use rowtone::wire::{Message, text};
 use serialport::{SerialPort, TTYPort};
 
 /// Two ends of a pseudo-terminal: the board's, and the host's with its name.
@@ -137,27 +138,8 @@ fn talk(
     rate: f64,
     mut seed: u64,
 ) {
-    let board = settings::Board {
-        version: [0, 1, 0],
-        limits: Limits {
-            width: 320,
-            height: 240,
-            min_width: 16,
-            max_window_s: 10.0,
-        },
-        defaults: Settings {
-            wire,
-            ..Settings::default()
-        },
-    };
-    let started = Started {
-        session: 1,
-        settings: None,
-        origin: SettingsOrigin::Defaults,
-    };
     let mut slots = [const { None }; 256];
-    let console = Console::new(board, started).expect("the defaults are valid");
-    let mut link = Link::new(console, Outbox::new(&mut slots), 115_200);
+    let mut link = console::link(&mut slots, wire);
     port.set_timeout(Duration::from_millis(2)).unwrap();
     let start = Instant::now();
     let mut bytes = [0; 512];
