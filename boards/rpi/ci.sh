@@ -6,7 +6,7 @@
 # host: the package without libcamera (simulated camera), and its unit. libcamera: builds libcamera 0.7 with its
 # virtual pipeline (once, kept in target/libcamera or $ROWTONE_LIBCAMERA), then the package with it and the program
 # against it, its UART on a pseudo-terminal. aarch64: the core's tests and the bit-identity of its kernels under
-# emulation. deb: the Debian package for arm64, installed into a folder, and the program in it under emulation: on its
+# emulation, and the instructions that a line takes. deb: the Debian package for arm64, installed into a folder, and the program in it under emulation: on its
 # simulated camera and on Debian's arm64 libcamera, peaks at the other end of its pseudo-terminal. Installs Debian
 # packages where they are missing.
 set -euo pipefail
@@ -44,8 +44,9 @@ with_libcamera() { # COMMAND...: with the libcamera that was built for this mach
 }
 
 aarch64() {
-    need gcc-aarch64-linux-gnu libc6-dev-arm64-cross qemu-user-static
+    need gcc gcc-aarch64-linux-gnu libc6-dev libc6-dev-arm64-cross qemu-user qemu-user-static
     tools/test-aarch64.sh
+    boards/rpi/ci/instructions.sh
 }
 
 deb() {

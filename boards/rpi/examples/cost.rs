@@ -81,13 +81,13 @@ fn main() {
     let counted_part = words.next().unwrap_or_default();
     let counted: Option<usize> = words.next().and_then(|rounds| rounds.parse().ok());
     // Emulators take their time.
-    let (height, learn) = match counted {
-        Some(_) => (96, "[camera]\nlearn_frames = 4\n"),
-        None => (480, "[camera]\n"),
+    let learn = match counted {
+        Some(_) => "[camera]\nlearn_frames = 4\n",
+        None => "[camera]\n",
     };
     let scene = Scene {
         width: 640,
-        height,
+        height: 480,
         line_time_s: 20e-6,
         paced: false,
         ..Scene::default()
