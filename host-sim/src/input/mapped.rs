@@ -13,6 +13,8 @@ use memmap2::{Mmap, MmapOptions};
 
 use super::Header;
 use super::bytes::Bytes;
+#[cfg(target_os = "linux")]
+use super::populate::Populate;
 use super::y4m::{FrameSource, Layout, Next, Reader};
 use crate::failure::Failure;
 
@@ -38,6 +40,8 @@ impl MappedReader {
             at: reader.header_bytes() as u64,
             start: 0,
             window: None,
+            #[cfg(target_os = "linux")]
+            populate: Populate::new(),
         };
         windows.map(0)?;
         Ok(Self {
@@ -90,6 +94,8 @@ struct Windows {
     at: u64,
     start: u64,
     window: Option<Arc<Mmap>>,
+    #[cfg(target_os = "linux")]
+    populate: Populate,
 }
 
 impl Windows {
@@ -134,7 +140,7 @@ impl Windows {
         }
         // SAFETY: the window is only read, as bytes of which any value will do. Where another program
         // changes the file meanwhile, pixels change and nothing else. Where it cuts the file short, a
-        // page that is not there any more is found by `populate`, as an error; only a cut in the moment
+        // page that is not there any more is found by `Populate`, as an error; only a cut in the moment
         // between there and the line, some milliseconds of a file that is at the same time read and
         // thrown away, ends this program with a bus error.
         let window = unsafe {
@@ -143,32 +149,11 @@ impl Windows {
                 .len(length)
                 .map(&self.file)?
         };
-        populate(&window)?;
+        #[cfg(target_os = "linux")]
+        self.populate.all(&window)?;
         self.window = Some(Arc::new(window));
         Ok(())
     }
-}
-
-/// Has the operating system enter all pages of a window now, in this thread: the lines meet no page
-/// fault, and a disk that cannot be read is an error instead of a signal.
-#[cfg(target_os = "linux")]
-fn populate(window: &Mmap) -> io::Result<()> {
-    use memmap2::Advice;
-    /// "Bad address": a page that cannot be read.
-    const EFAULT: i32 = 14;
-    // Both only help: a kernel that does not know them enters each page when it is first met.
-    let _ = window.advise(Advice::Sequential);
-    match window.advise(Advice::PopulateRead) {
-        Err(error) if error.raw_os_error() == Some(EFAULT) => {
-            Err(io::Error::other("the disk does not deliver it"))
-        }
-        _ => Ok(()),
-    }
-}
-
-#[cfg(not(target_os = "linux"))]
-fn populate(_: &Mmap) -> io::Result<()> {
-    Ok(())
 }
 
 #[cfg(test)]

@@ -14,6 +14,8 @@ mod mapped;
 mod options;
 mod part;
 mod pixel_format;
+#[cfg(target_os = "linux")]
+mod populate;
 pub mod pts;
 pub mod y4m;
 
