@@ -53,6 +53,17 @@ pub(crate) fn whole(v: f32) -> u16 {
     (nearest.to_bits() - u32::from(above)) as u16
 }
 
+/// Asks memory for what will be read some lines later, where a processor can be asked: it reads other things meanwhile.
+#[inline(always)]
+pub(crate) fn ask_for<T>(later: &[T]) {
+    #[cfg(target_arch = "x86_64")]
+    for some in later.chunks((64 / size_of::<T>().max(1)).max(1)) {
+        x86_64::ask(some.as_ptr().cast());
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = later;
+}
+
 /// Which implementation is used. Only those that the processor can run can be had.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Kernel(Kind);

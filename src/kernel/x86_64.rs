@@ -77,9 +77,14 @@ pub(super) fn ask_ahead(step: &[u8; 64]) {
 /// [`ask_ahead`], from any place.
 #[inline(always)]
 pub(super) fn ask_ahead_of(place: *const u8) {
-    let ahead = place.wrapping_add(AHEAD);
+    ask(place.wrapping_add(AHEAD));
+}
+
+/// Asks memory for the line of the cache that this place is in.
+#[inline(always)]
+pub(super) fn ask(place: *const u8) {
     // SAFETY: a prefetch changes nothing that the program could see, and never faults, whatever the address.
-    unsafe { _mm_prefetch::<_MM_HINT_T1>(ahead.cast()) };
+    unsafe { _mm_prefetch::<_MM_HINT_T1>(place.cast()) };
 }
 
 /// 64 bytes as two vectors.

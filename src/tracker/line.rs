@@ -11,7 +11,7 @@ use super::{
     predict::Prediction,
     row::Row,
 };
-use crate::{camera::Line, pixel::Pixel, reference::RowTable};
+use crate::{camera::Line, kernel, pixel::Pixel, reference::RowTable};
 
 /// A line that was looked at and is further than this from where it was expected has jumped, px.
 const JUMP_PX: f32 = 1.0;
@@ -278,6 +278,10 @@ impl Tracker<'_> {
             self.attend = self.attend.min(self.turn);
         }
         self.beside = self.follow.is_busy() || self.watch.is_searching();
+        // Some ten microseconds before it is read: between two looks at a row, 32 frames have been through the caches.
+        let width = usize::from(self.config.width);
+        let mean = self.storage.mean.get(self.attend * width..);
+        kernel::ask_for(mean.and_then(|m| m.get(..width)).unwrap_or_default());
         looked
     }
 }
