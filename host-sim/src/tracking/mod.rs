@@ -9,25 +9,19 @@
 
 mod background;
 mod engine;
+mod lines;
 pub mod region;
 
-use rowtone::timeline::{Binner, Displacement, Group, Sample};
+use rowtone::timeline::{Displacement, Group, Sample};
 
 pub use background::subtract;
 pub use engine::{Engine, Unmeasured};
-use region::Region;
 
 use crate::failure::Failure;
-use crate::input::{Camera, Feed, Frame, Rect};
+use crate::input::{Camera, Feed, Rect};
 use crate::memory::TrackerMemory;
-use crate::ring::{Inlet, Next, Outlet, ring};
+use crate::ring::{Inlet, Next, ring};
 
-/// Frames that the reference is learned from.
-const LEARN_FRAMES: usize = 30;
-/// Frames of the first round.
-const ROUGH_FRAMES: usize = 10;
-/// Fewer where they are so large that keeping them would take more than this, bytes of luma.
-const LEARN_BYTES: usize = 512 << 20;
 /// Blocks of displacements on their way: the lines go on while a report is computed.
 const BLOCKS: usize = 4;
 /// Frames of a block, where nobody waits for each.
@@ -92,7 +86,7 @@ impl Shifts {
             let mut memory = TrackerMemory::new(part.width, part.height);
             Engine::new(part, camera.timing, camera.bits, 1, &mut memory, &name)?;
         }
-        std::thread::spawn(move || run(feed, part, groups, outlet));
+        std::thread::spawn(move || lines::run(feed, part, groups, outlet));
         Ok(Self {
             inlet,
             warning: None,
@@ -135,192 +129,5 @@ impl Shifts {
     /// Something to tell the user after the last frame.
     pub fn warning(&self) -> Option<&str> {
         self.warning.as_deref()
-    }
-}
-
-/// The line thread.
-fn run(mut feed: Feed, part: Rect, groups: Option<Group>, mut to: Outlet<FrameShifts, Ending>) {
-    let memory_for = |part: &Rect| TrackerMemory::new(part.width, part.height);
-    let mut memory = memory_for(&part);
-    let mut still_memory = feed.camera.background.as_ref().map(memory_for);
-    let (kept, ending) = keep_first(&mut feed);
-    let whole = Region::whole(&part);
-    let region = match feed.camera.part.is_none() {
-        true => region::choose(&kept, &part, &feed.camera.timing),
-        false => whole.clone(),
-    };
-    let note = (region != whole).then(|| told(&region, &feed.camera));
-    let ending = Lines::new(feed, part, &region, &mut memory, still_memory.as_mut()).and_then(
-        |mut lines| {
-            lines.binner = groups.map(Binner::new);
-            lines.run(kept, ending, note, &mut to)
-        },
-    );
-    to.end(ending);
-}
-
-/// What `--roi auto` chose.
-fn told(region: &Region, camera: &Camera) -> String {
-    let Region { columns, rows } = region;
-    let part = Rect {
-        x: columns.start,
-        y: rows.start,
-        width: columns.len(),
-        height: rows.len(),
-    };
-    // As the user gives it: in the picture as it was.
-    let (width, height) = camera.size;
-    let part = camera.turn.back().part(part, width, height);
-    format!(
-        "--roi auto measures {},{},{},{}: the rest does not move with it (--roi full for all of it)",
-        part.x, part.y, part.width, part.height
-    )
-}
-
-/// The frames to learn from, and whether more follow.
-fn keep_first(feed: &mut Feed) -> (Vec<Frame>, Result<bool, Failure>) {
-    let (width, height) = feed.camera.size;
-    let most = (LEARN_BYTES / (width * height)).clamp(2, LEARN_FRAMES);
-    let mut kept = Vec::new();
-    while kept.len() < most {
-        match feed.next_frame() {
-            Ok(Some(frame)) => kept.push(frame),
-            Ok(None) => return (kept, Ok(false)),
-            Err(failure) => return (kept, Err(failure)),
-        }
-    }
-    (kept, Ok(true))
-}
-
-/// State of the line thread.
-struct Lines<'a> {
-    feed: Feed,
-    moving: Engine<'a>,
-    still: Option<Engine<'a>>,
-    /// The background's rows of this frame.
-    still_rows: Vec<Displacement>,
-    /// Where rows are combined.
-    binner: Option<Binner>,
-}
-
-impl<'a> Lines<'a> {
-    fn new(
-        feed: Feed,
-        part: Rect,
-        region: &Region,
-        memory: &'a mut TrackerMemory,
-        still_memory: Option<&'a mut TrackerMemory>,
-    ) -> Result<Self, Failure> {
-        let camera = &feed.camera;
-        let learn = LEARN_FRAMES as u16;
-        let engine =
-            |part, memory| Engine::new(part, camera.timing, camera.bits, learn, memory, &feed.name);
-        let columns = Rect {
-            x: region.columns.start,
-            width: region.columns.len(),
-            ..part
-        };
-        let first = region.rows.start - part.y;
-        let moving = engine(columns, memory)?.only_rows(first..first + region.rows.len());
-        let still = match (camera.background, still_memory) {
-            (Some(part), Some(memory)) => Some(engine(part, memory)?),
-            _ => None,
-        };
-        Ok(Self {
-            feed,
-            moving,
-            still,
-            still_rows: Vec::new(),
-            binner: None,
-        })
-    }
-
-    /// Learns, then measures every frame. The warning at the end is the feed's.
-    fn run(
-        &mut self,
-        kept: Vec<Frame>,
-        mut ending: Result<bool, Failure>,
-        mut note: Option<String>,
-        to: &mut Outlet<FrameShifts, Ending>,
-    ) -> Ending {
-        if kept.len() < 2 {
-            ending?;
-            return Err(Failure::input(format!(
-                "{}: only one frame: motion shows only from frame to frame",
-                self.feed.name
-            )));
-        }
-        // The first round only has to find the motion: some frames, spread over all of them, will do.
-        let rough = kept.len().div_ceil(ROUGH_FRAMES);
-        for step in [rough, 1] {
-            for engine in [Some(&mut self.moving), self.still.as_mut()]
-                .into_iter()
-                .flatten()
-            {
-                kept.iter()
-                    .step_by(step)
-                    .for_each(|frame| engine.learn(frame));
-                engine.end_round();
-            }
-        }
-        for frame in kept {
-            if !self.measure(frame, note.take(), to) {
-                return Ok(None);
-            }
-        }
-        while let Ok(true) = ending {
-            match self.feed.next_frame() {
-                Ok(Some(frame)) => {
-                    if !self.measure(frame, None, to) {
-                        return Ok(None);
-                    }
-                }
-                Ok(None) => ending = Ok(false),
-                Err(failure) => ending = Err(failure),
-            }
-        }
-        ending.map(|_| self.feed.warning().map(str::to_owned))
-    }
-
-    /// Measures a frame and sends what came of it. `false` when nobody listens any more.
-    fn measure(
-        &mut self,
-        frame: Frame,
-        note: Option<String>,
-        to: &mut Outlet<FrameShifts, Ending>,
-    ) -> bool {
-        let Some(mut shifts) = to.spare() else {
-            return false;
-        };
-        shifts.number = frame.number;
-        shifts.start_ns = frame.start_ns;
-        shifts.note = note;
-        shifts.rows.clear();
-        shifts.samples.clear();
-        if let Some(binner) = &mut self.binner {
-            binner.set_curvature(self.moving.curvature());
-        }
-        let (rows, samples) = (&mut shifts.rows, &mut shifts.samples);
-        match (&mut self.still, &mut self.binner) {
-            (None, Some(binner)) => {
-                let take = |sample| samples.push(sample);
-                shifts.unmeasured = self.moving.measure_into(&frame, binner, take);
-            }
-            (still, binner) => {
-                shifts.unmeasured = self.moving.measure(&frame, |row| rows.push(row));
-                if let Some(still) = still {
-                    self.still_rows.clear();
-                    still.measure(&frame, |row| self.still_rows.push(row));
-                    background::subtract(rows, &self.still_rows);
-                }
-                if let Some(binner) = binner {
-                    samples.extend(rows.drain(..).filter_map(|row| binner.push(row)));
-                }
-            }
-        }
-        // No group reaches over the end of a frame.
-        samples.extend(self.binner.as_mut().and_then(Binner::finish));
-        self.feed.recycle(frame);
-        to.put(shifts)
     }
 }
