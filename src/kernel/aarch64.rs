@@ -1,15 +1,17 @@
-//! NEON: 16 pixels a step, with the dot-product instructions of Armv8.2 (Raspberry Pi 5) or without
+//! NEON: 64 pixels a step, with the dot-product instructions of Armv8.2 (Raspberry Pi 5) or without
 //! (Raspberry Pi 3, 4 and Zero 2).
 //!
-//! NEON multiplies signed by signed. A pixel with its top bit flipped is a signed number, smaller by half
-//! the range, so Σ h·p = Σ h·(p − half) + half·Σ h, whatever Σ h is.
+//! NEON multiplies unsigned by unsigned. A coefficient and [`MAX_COEFFICIENT`] together are an unsigned number, so
+//! Σ h·p = Σ (h + 64)·p − 64·Σ p, and Σ p is wanted anyway.
 
-use super::{Sums, portable};
+use super::{MAX_COEFFICIENT, Sums, portable, spread::Groups};
 use core::arch::{aarch64::*, asm};
 
-/// Pixels a block: 65536·64·128 = 2²⁹, so a whole block's sums fit 31 bits.
-const BLOCK_U8: usize = 1 << 16;
-/// The same for deep pixels, a lane of four: 2048/4·64·32768 = 2³⁰.
+/// Steps a block with dot products: 1024·64·255·128 < 2³¹, so a whole block's sums fit 32 bits.
+const STEPS_DOT: usize = 1024;
+/// Without: a lane of 16 bits of the pixel sum gains 2·2·255 a step, 64 steps fit.
+const STEPS: usize = 64;
+/// Deep pixels: a lane of the products gains 2·65535·128 a step of 16 pixels, 128 steps stay below 2³¹.
 const BLOCK_U16: usize = 2048;
 
 /// The processor has the dot-product instructions.
@@ -26,82 +28,21 @@ pub(super) fn has_dot_product() -> bool {
     }
 }
 
-/// The sums of some steps, before the pixels' top bits are put back.
-pub(super) struct Parts {
-    /// Σ h·(p − half).
-    pub(super) product: i64,
-    /// Σ p.
-    pub(super) pixels: u64,
-    /// Σ h.
-    pub(super) coefficients: i64,
-}
-
-impl Parts {
-    pub(super) fn sums(self, half: i64, rest: Sums) -> Sums {
-        Sums {
-            product: self.product + half * self.coefficients + rest.product,
-            pixels: self.pixels + rest.pixels,
+impl Sums {
+    /// Of both.
+    #[inline]
+    fn and(self, other: Self) -> Self {
+        Self {
+            product: self.product + other.product,
+            pixels: self.pixels + other.pixels,
         }
     }
 }
 
-/// Cuts both sides to the shorter length and into blocks, and adds up what `steps` makes of each.
-#[inline(always)]
-fn blocks<P, const STEP: usize>(
-    pixels: &[P],
-    coefficients: &[i8],
-    block: usize,
-    half: i64,
-    steps: impl Fn(&[[P; STEP]], &[[i8; STEP]]) -> Parts,
-    rest: impl Fn(&[P], &[i8]) -> Sums,
-) -> Sums {
-    let n = pixels.len().min(coefficients.len());
-    let mut all = Sums::default();
-    for (p, h) in pixels[..n]
-        .chunks(block)
-        .zip(coefficients[..n].chunks(block))
-    {
-        let (p_steps, p_rest) = p.as_chunks::<STEP>();
-        let (h_steps, h_rest) = h.as_chunks::<STEP>();
-        let sums = steps(p_steps, h_steps).sums(half, rest(p_rest, h_rest));
-        all.product += sums.product;
-        all.pixels += sums.pixels;
-    }
-    all
-}
-
-#[target_feature(enable = "neon")]
-fn load_u8(bytes: &[u8; 16]) -> uint8x16_t {
-    // SAFETY: the array is 16 bytes long and the load needs no alignment.
-    unsafe { vld1q_u8(bytes.as_ptr()) }
-}
-
-#[target_feature(enable = "neon")]
-pub(super) fn load_i8(bytes: &[i8; 16]) -> int8x16_t {
-    // SAFETY: the array is 16 bytes long and the load needs no alignment.
-    unsafe { vld1q_s8(bytes.as_ptr()) }
-}
-
-/// p − 128 as signed bytes.
-#[target_feature(enable = "neon")]
-pub(super) fn centred(p: uint8x16_t) -> int8x16_t {
-    vreinterpretq_s8_u8(veorq_u8(p, vdupq_n_u8(0x80)))
-}
-
 /// `sum` + products of four neighbouring bytes each (the intrinsic is not stable yet).
+#[inline]
 #[target_feature(enable = "neon,dotprod")]
-pub(super) fn dot_i8(mut sum: int32x4_t, a: int8x16_t, b: int8x16_t) -> int32x4_t {
-    // SAFETY: registers only; the instruction is there, the function is compiled for it.
-    unsafe {
-        asm!("sdot {0:v}.4s, {1:v}.16b, {2:v}.16b", inout(vreg) sum, in(vreg) a, in(vreg) b,
-            options(pure, nomem, nostack, preserves_flags));
-    }
-    sum
-}
-
-/// As [`dot_i8`], unsigned.
-#[target_feature(enable = "neon,dotprod")]
-pub(super) fn dot_u8(mut sum: uint32x4_t, a: uint8x16_t, b: uint8x16_t) -> uint32x4_t {
+fn dot(mut sum: uint32x4_t, a: uint8x16_t, b: uint8x16_t) -> uint32x4_t {
     // SAFETY: registers only; the instruction is there, the function is compiled for it.
     unsafe {
         asm!("udot {0:v}.4s, {1:v}.16b, {2:v}.16b", inout(vreg) sum, in(vreg) a, in(vreg) b,
@@ -110,113 +51,190 @@ pub(super) fn dot_u8(mut sum: uint32x4_t, a: uint8x16_t, b: uint8x16_t) -> uint3
     sum
 }
 
-#[target_feature(enable = "neon,dotprod")]
-fn steps_u8_dot(p_steps: &[[u8; 16]], h_steps: &[[i8; 16]]) -> Parts {
-    let zero = vdupq_n_s32(0);
-    // Two sets of sums hide the latency of the dot products.
-    let (mut product, mut coefficients) = ([zero; 2], [zero; 2]);
-    let mut pixels = [vdupq_n_u32(0); 2];
-    let (ones, ones_u) = (vdupq_n_s8(1), vdupq_n_u8(1));
-    let (p_pairs, p_last) = p_steps.as_chunks::<2>();
-    let (h_pairs, h_last) = h_steps.as_chunks::<2>();
-    for (p, h) in p_pairs.iter().zip(h_pairs) {
-        for i in 0..2 {
-            let (p, h) = (load_u8(&p[i]), load_i8(&h[i]));
-            product[i] = dot_i8(product[i], centred(p), h);
-            coefficients[i] = dot_i8(coefficients[i], ones, h);
-            pixels[i] = dot_u8(pixels[i], p, ones_u);
-        }
-    }
-    for (p, h) in p_last.iter().zip(h_last) {
-        let (p, h) = (load_u8(p), load_i8(h));
-        product[0] = dot_i8(product[0], centred(p), h);
-        coefficients[0] = dot_i8(coefficients[0], ones, h);
-        pixels[0] = dot_u8(pixels[0], p, ones_u);
-    }
-    Parts {
-        product: vaddlvq_s32(product[0]) + vaddlvq_s32(product[1]),
-        pixels: vaddlvq_u32(pixels[0]) + vaddlvq_u32(pixels[1]),
-        coefficients: vaddlvq_s32(coefficients[0]) + vaddlvq_s32(coefficients[1]),
-    }
-}
-
+/// h + 64, from 0 on.
+#[inline]
 #[target_feature(enable = "neon")]
-fn steps_u8(p_steps: &[[u8; 16]], h_steps: &[[i8; 16]]) -> Parts {
-    let (mut product, mut coefficients) = (vdupq_n_s32(0), vdupq_n_s32(0));
-    let mut pixels = vdupq_n_u32(0);
-    for (p, h) in p_steps.iter().zip(h_steps) {
-        let (p, h) = (load_u8(p), load_i8(h));
-        let c = centred(p);
-        // Two products of at most 128·64 a lane stay in 16 bits.
-        let pair = vmull_s8(vget_low_s8(c), vget_low_s8(h));
-        let pair = vmlal_high_s8(pair, c, h);
-        product = vpadalq_s16(product, pair);
-        coefficients = vpadalq_s16(coefficients, vpaddlq_s8(h));
-        pixels = vpadalq_u16(pixels, vpaddlq_u8(p));
-    }
-    Parts {
-        product: vaddlvq_s32(product),
-        pixels: vaddlvq_u32(pixels),
-        coefficients: vaddlvq_s32(coefficients),
-    }
+fn unsigned(h: &[i8; 16]) -> uint8x16_t {
+    // SAFETY: the array is 16 bytes long and the load needs no alignment.
+    let h = unsafe { vld1q_s8(h.as_ptr()) };
+    vreinterpretq_u8_s8(vaddq_s8(h, vdupq_n_s8(MAX_COEFFICIENT)))
 }
 
+/// [`unsigned`] of a step of 64.
+#[inline]
 #[target_feature(enable = "neon")]
-fn steps_u16(p_steps: &[[u16; 16]], h_steps: &[[i8; 16]]) -> Parts {
-    let zero = vdupq_n_s32(0);
-    let (mut product, mut coefficients) = ([zero; 2], zero);
-    let mut pixels = vdupq_n_u32(0);
-    for (p, h) in p_steps.iter().zip(h_steps) {
-        let h = load_i8(h);
-        // SAFETY: the array is 32 bytes long and the loads need no alignment.
-        let p = unsafe { [vld1q_u16(p.as_ptr()), vld1q_u16(p.as_ptr().add(8))] };
-        for (p, h) in [(p[0], vmovl_s8(vget_low_s8(h))), (p[1], vmovl_high_s8(h))] {
-            let c = vreinterpretq_s16_u16(veorq_u16(p, vdupq_n_u16(0x8000)));
-            product[0] = vmlal_s16(product[0], vget_low_s16(c), vget_low_s16(h));
-            product[1] = vmlal_high_s16(product[1], c, h);
-            pixels = vpadalq_u16(pixels, p);
-        }
-        coefficients = vpadalq_s16(coefficients, vpaddlq_s8(h));
-    }
-    Parts {
-        product: vaddlvq_s32(product[0]) + vaddlvq_s32(product[1]),
-        pixels: vaddlvq_u32(pixels),
-        coefficients: vaddlvq_s32(coefficients),
-    }
+fn unsigned_64(h: &[i8; 64]) -> [uint8x16_t; 4] {
+    let (parts, _) = h.as_chunks::<16>();
+    [0, 1, 2, 3].map(|k| unsigned(&parts[k]))
 }
 
-#[target_feature(enable = "neon,dotprod")]
-pub(super) fn sums_u8_dot(pixels: &[u8], coefficients: &[i8]) -> Sums {
-    blocks(
+/// The sums of some steps, of which those of the products are too large by 64·Σ p.
+#[inline]
+fn offset_off(product: u64, pixels: u64) -> Sums {
+    Sums {
+        product: product as i64 - i64::from(MAX_COEFFICIENT) * pixels as i64,
         pixels,
-        coefficients,
-        BLOCK_U8,
-        128,
-        |p, h| steps_u8_dot(p, h),
-        portable::sums_u8,
-    )
+    }
 }
 
-#[target_feature(enable = "neon")]
-pub(super) fn sums_u8(pixels: &[u8], coefficients: &[i8]) -> Sums {
-    blocks(
-        pixels,
-        coefficients,
-        BLOCK_U8,
-        128,
-        |p, h| steps_u8(p, h),
-        portable::sums_u8,
-    )
+impl<const PIXELS: usize, const BYTES: usize, const FIRST: usize> Groups<PIXELS, BYTES, FIRST> {
+    /// All sums.
+    #[target_feature(enable = "neon")]
+    pub(super) fn sums_neon(bytes: &[u8], coefficients: &[i8]) -> Sums {
+        let steps = Self::steps(bytes, coefficients);
+        if steps.len() > STEPS {
+            // SAFETY: this processor has what this function needs.
+            return unsafe { Self::in_parts(bytes, coefficients, STEPS, Self::sums_neon) };
+        }
+        // SAFETY: `steps` are those that `bytes` has pixels for.
+        let sums = unsafe { Self::block(bytes.as_ptr(), steps) };
+        Self::and_rest(sums, bytes, coefficients, steps.len())
+    }
+
+    /// As [`Self::sums_neon`], with the dot-product instructions.
+    #[target_feature(enable = "neon,dotprod")]
+    pub(super) fn sums_dot(bytes: &[u8], coefficients: &[i8]) -> Sums {
+        let steps = Self::steps(bytes, coefficients);
+        if steps.len() > STEPS_DOT {
+            // SAFETY: this processor has what this function needs.
+            return unsafe { Self::in_parts(bytes, coefficients, STEPS_DOT, Self::sums_dot) };
+        }
+        // SAFETY: `steps` are those that `bytes` has pixels for.
+        let sums = unsafe { Self::block_dot(bytes.as_ptr(), steps) };
+        Self::and_rest(sums, bytes, coefficients, steps.len())
+    }
+
+    /// The coefficients of the whole steps.
+    #[inline(always)]
+    fn steps<'a>(bytes: &[u8], coefficients: &'a [i8]) -> &'a [[i8; 64]] {
+        let (steps, _) = coefficients.as_chunks::<64>();
+        &steps[..steps.len().min(bytes.len() / Self::STEP_BYTES)]
+    }
+
+    /// More than so many steps.
+    ///
+    /// # Safety
+    /// The processor has what `sums` needs.
+    #[cold]
+    #[inline(never)]
+    unsafe fn in_parts(
+        bytes: &[u8],
+        coefficients: &[i8],
+        steps: usize,
+        sums: unsafe fn(&[u8], &[i8]) -> Sums,
+    ) -> Sums {
+        let pixels = bytes.chunks(steps * Self::STEP_BYTES);
+        let parts = pixels.zip(coefficients.chunks(steps * 64));
+        parts.fold(Sums::default(), |all, (bytes, coefficients)| {
+            // SAFETY: the caller vouches for it.
+            all.and(unsafe { sums(bytes, coefficients) })
+        })
+    }
+
+    /// `sums` of the whole steps, and of what is left.
+    #[inline(always)]
+    fn and_rest(sums: Sums, bytes: &[u8], coefficients: &[i8], steps: usize) -> Sums {
+        if coefficients.len() == steps * 64 {
+            return sums;
+        }
+        Self::rest(sums, bytes, coefficients, steps)
+    }
+
+    #[inline(never)]
+    fn rest(sums: Sums, bytes: &[u8], coefficients: &[i8], steps: usize) -> Sums {
+        let bytes = bytes.get(steps * Self::STEP_BYTES..).unwrap_or_default();
+        let coefficients = coefficients.get(steps * 64..).unwrap_or_default();
+        let mut pixels = [0; 64];
+        // SAFETY: the program was compiled for processors with NEON.
+        let there = unsafe { Self::gather_rest(bytes, &mut pixels) };
+        let there = there.min(coefficients.len());
+        sums.and(portable::sums_u8(&pixels[..there], coefficients))
+    }
+
+    /// # Safety
+    /// From `from` on there are as many steps as of coefficients.
+    #[inline]
+    #[target_feature(enable = "neon")]
+    unsafe fn block(mut from: *const u8, coefficients: &[[i8; 64]]) -> Sums {
+        let mut product = [vdupq_n_u32(0); 2];
+        let mut pixels = [vdupq_n_u16(0); 2];
+        for h in coefficients {
+            // SAFETY: a step's bytes are there, as the caller says.
+            let (p, h) = (unsafe { Self::pixels_64(from) }, unsigned_64(h));
+            from = from.wrapping_add(Self::STEP_BYTES);
+            for k in 0..4 {
+                // Two products of at most 255·128 a lane stay in 16 bits.
+                let pair = vmull_u8(vget_low_u8(p[k]), vget_low_u8(h[k]));
+                let pair = vmlal_high_u8(pair, p[k], h[k]);
+                product[k % 2] = vpadalq_u16(product[k % 2], pair);
+                pixels[k % 2] = vpadalq_u8(pixels[k % 2], p[k]);
+            }
+        }
+        // A lane of both products together fits, and so does the sum of all pixels.
+        offset_off(
+            vaddlvq_u32(vaddq_u32(product[0], product[1])),
+            u64::from(vaddlvq_u16(pixels[0]) + vaddlvq_u16(pixels[1])),
+        )
+    }
+
+    /// # Safety
+    /// As of [`Self::block`].
+    #[inline]
+    #[target_feature(enable = "neon,dotprod")]
+    unsafe fn block_dot(mut from: *const u8, coefficients: &[[i8; 64]]) -> Sums {
+        // Two sets of sums hide the latency of the dot products.
+        let (mut product, mut pixels) = ([vdupq_n_u32(0); 2], [vdupq_n_u32(0); 2]);
+        let ones = vdupq_n_u8(1);
+        for h in coefficients {
+            // SAFETY: a step's bytes are there, as the caller says.
+            let (p, h) = (unsafe { Self::pixels_64(from) }, unsigned_64(h));
+            from = from.wrapping_add(Self::STEP_BYTES);
+            for k in 0..4 {
+                product[k % 2] = dot(product[k % 2], p[k], h[k]);
+                pixels[k % 2] = dot(pixels[k % 2], p[k], ones);
+            }
+        }
+        // A lane of both together fits.
+        offset_off(
+            vaddlvq_u32(vaddq_u32(product[0], product[1])),
+            vaddlvq_u32(vaddq_u32(pixels[0], pixels[1])),
+        )
+    }
 }
 
+/// All sums; what is left of a block's steps of 16 is done in plain Rust.
 #[target_feature(enable = "neon")]
 pub(super) fn sums_u16(pixels: &[u16], coefficients: &[i8]) -> Sums {
-    blocks(
-        pixels,
-        coefficients,
-        BLOCK_U16,
-        32768,
-        |p, h| steps_u16(p, h),
-        portable::sums_u16,
+    let n = pixels.len().min(coefficients.len());
+    let (pixels, coefficients) = (&pixels[..n], &coefficients[..n]);
+    let mut all = Sums::default();
+    for (p, h) in pixels.chunks(BLOCK_U16).zip(coefficients.chunks(BLOCK_U16)) {
+        let (p_steps, p_rest) = p.as_chunks::<16>();
+        let (h_steps, h_rest) = h.as_chunks::<16>();
+        let sums = steps_u16(p_steps, h_steps);
+        all = all.and(sums).and(portable::sums_u16(p_rest, h_rest));
+    }
+    all
+}
+
+#[inline]
+#[target_feature(enable = "neon")]
+fn steps_u16(p_steps: &[[u16; 16]], h_steps: &[[i8; 16]]) -> Sums {
+    let mut product = [vdupq_n_u32(0); 2];
+    let mut pixels = [vdupq_n_u32(0); 2];
+    for (p, h) in p_steps.iter().zip(h_steps) {
+        let h = unsigned(h);
+        let h = [vmovl_u8(vget_low_u8(h)), vmovl_high_u8(h)];
+        for k in 0..2 {
+            // SAFETY: the array is 16 words long and the loads need no alignment.
+            let p = unsafe { vld1q_u16(p.as_ptr().add(8 * k)) };
+            product[0] = vmlal_u16(product[0], vget_low_u16(p), vget_low_u16(h[k]));
+            product[1] = vmlal_high_u16(product[1], p, h[k]);
+            pixels[k] = vpadalq_u16(pixels[k], p);
+        }
+    }
+    offset_off(
+        vaddlvq_u32(product[0]) + vaddlvq_u32(product[1]),
+        vaddlvq_u32(pixels[0]) + vaddlvq_u32(pixels[1]),
     )
 }

@@ -182,10 +182,10 @@ impl Kernel {
             Kind::Avx512 { .. } => unsafe { x86_64_avx512::sums_u8(pixels, coefficients) },
             // SAFETY: the program was compiled for processors with NEON.
             #[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
-            Kind::Neon => unsafe { aarch64::sums_u8(pixels, coefficients) },
+            Kind::Neon => unsafe { spread::Bytes::sums_neon(pixels, coefficients) },
             // SAFETY: `fastest` made this kind after it asked for the dot product.
             #[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
-            Kind::NeonDot => unsafe { aarch64::sums_u8_dot(pixels, coefficients) },
+            Kind::NeonDot => unsafe { spread::Bytes::sums_dot(pixels, coefficients) },
         }
     }
 

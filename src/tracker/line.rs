@@ -9,9 +9,14 @@ use super::{
     correlate::{Unfound, part},
     flicker::Flicker,
     predict::Prediction,
-    row::Row,
+    row::{Row, Scattered, Summed},
 };
-use crate::{camera::Line, kernel, pixel::Pixel, reference::RowTable};
+use crate::{
+    camera::{Line, UpperBytes},
+    kernel,
+    pixel::Pixel,
+    reference::RowTable,
+};
 
 /// A line that was looked at and is further than this from where it was expected has jumped, px.
 const JUMP_PX: f32 = 1.0;
@@ -53,22 +58,47 @@ impl Tracker<'_> {
     /// Takes one line.
     #[inline(always)]
     pub(super) fn take<R: Row>(&mut self, line: &Line<'_>, pixels: R) -> Result<Place, Left> {
-        let mut sums = None;
-        if line.row < self.quiet.until_row
-            && line.frame == self.quiet.frame
-            && pixels.len() == usize::from(self.config.width)
-        {
-            match self.take_quietly(usize::from(line.row), &pixels) {
-                Ok(place) => return Ok(place),
-                Err(taken) => sums = taken,
-            }
-        }
-        self.take_with_care(line, pixels, sums)
+        self.take_quietly(line, &pixels)
+            .or_else(|sums| self.take_with_care(line, pixels, sums))
+    }
+
+    /// Takes one whose pixels do not lie side by side.
+    #[inline(always)]
+    pub(super) fn take_scattered(
+        &mut self,
+        line: &Line<'_>,
+        upper: UpperBytes<'_>,
+    ) -> Result<Place, Left> {
+        self.take_quietly(line, &upper)
+            .or_else(|sums| self.take_scattered_with_care(line, upper, sums))
+    }
+
+    #[inline(never)]
+    fn take_scattered_with_care(
+        &mut self,
+        line: &Line<'_>,
+        upper: UpperBytes<'_>,
+        sums: Sums,
+    ) -> Result<Place, Left> {
+        let room = core::mem::take(&mut self.room);
+        let place = match Scattered::new(upper, self.config.kernel, &mut *room) {
+            Some(row) => self.take_with_care(line, row, sums),
+            None => Err(self.misfit()),
+        };
+        self.room = room;
+        place
     }
 
     /// What every line takes. Nothing has changed where it is refused.
     #[inline(always)]
-    fn take_quietly<R: Row>(&mut self, row: usize, pixels: &R) -> Result<Place, Sums> {
+    fn take_quietly<R: Summed>(&mut self, line: &Line<'_>, pixels: &R) -> Result<Place, Sums> {
+        if line.row >= self.quiet.until_row
+            || line.frame != self.quiet.frame
+            || pixels.len() != usize::from(self.config.width)
+        {
+            return Err(None);
+        }
+        let row = usize::from(line.row);
         let expected = self.prediction.rest_px();
         let (Some(table), Some(coefficients)) = (
             self.storage.tables.get(row),
@@ -138,7 +168,7 @@ impl Tracker<'_> {
         })
     }
 
-    pub(super) fn misfit(&mut self) -> Left {
+    fn misfit(&mut self) -> Left {
         self.counts.misfit = self.counts.misfit.wrapping_add(1);
         Left::Misfit
     }

@@ -44,7 +44,6 @@ use flicker::Flicker;
 use follow::Follow;
 use line::{Left, Place, Quiet};
 use predict::Prediction;
-use row::Scattered;
 use watch::Watch;
 
 /// What a line came to.
@@ -261,17 +260,6 @@ impl<'a> Tracker<'a> {
     ) -> Option<Sample> {
         let place = self.take_scattered(line, pixels);
         self.pass_on(line, place, binner)
-    }
-
-    #[inline(always)]
-    fn take_scattered(&mut self, line: &Line<'_>, upper: UpperBytes<'_>) -> Result<Place, Left> {
-        let room = core::mem::take(&mut self.room);
-        let place = match Scattered::new(upper, self.config.kernel, &mut *room) {
-            Some(row) => self.take(line, row),
-            None => Err(self.misfit()),
-        };
-        self.room = room;
-        place
     }
 
     #[inline(always)]

@@ -2,20 +2,23 @@
 
 use crate::{camera::UpperBytes, kernel::Kernel, pixel::Pixel};
 
-/// The pixels of a line.
-pub(super) trait Row {
-    /// One of them.
-    type P: Pixel;
+/// The pixels of a line, as far as most lines need them.
+pub(super) trait Summed {
     /// How many they are.
     fn len(&self) -> usize;
     /// Σ h·p and Σ p of all of them, as [`Pixel::sums`].
     fn sums(&self, kernel: Kernel, coefficients: &[i8]) -> (f32, f32);
+}
+
+/// The pixels of a line.
+pub(super) trait Row: Summed {
+    /// One of them.
+    type P: Pixel;
     /// All of them, side by side.
     fn pixels(&mut self) -> &[Self::P];
 }
 
-impl<P: Pixel> Row for &[P] {
-    type P = P;
+impl<P: Pixel> Summed for &[P] {
     #[inline(always)]
     fn len(&self) -> usize {
         <[P]>::len(self)
@@ -24,6 +27,10 @@ impl<P: Pixel> Row for &[P] {
     fn sums(&self, kernel: Kernel, coefficients: &[i8]) -> (f32, f32) {
         P::sums(kernel, self, coefficients)
     }
+}
+
+impl<P: Pixel> Row for &[P] {
+    type P = P;
     #[inline(always)]
     fn pixels(&mut self) -> &[P] {
         self
@@ -53,17 +60,29 @@ impl<'a> Scattered<'a> {
     }
 }
 
-impl Row for Scattered<'_> {
-    type P = u8;
+impl Summed for UpperBytes<'_> {
     #[inline(always)]
     fn len(&self) -> usize {
-        self.upper.len()
+        UpperBytes::len(self)
     }
     #[inline(always)]
     fn sums(&self, kernel: Kernel, coefficients: &[i8]) -> (f32, f32) {
-        let sums = self.upper.sums(kernel, coefficients);
+        let sums = UpperBytes::sums(self, kernel, coefficients);
         (sums.product as i32 as f32, sums.pixels as u32 as f32)
     }
+}
+
+impl Summed for Scattered<'_> {
+    fn len(&self) -> usize {
+        self.upper.len()
+    }
+    fn sums(&self, kernel: Kernel, coefficients: &[i8]) -> (f32, f32) {
+        Summed::sums(&self.upper, kernel, coefficients)
+    }
+}
+
+impl Row for Scattered<'_> {
+    type P = u8;
     #[inline(never)]
     fn pixels(&mut self) -> &[u8] {
         if !self.together {

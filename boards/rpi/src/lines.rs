@@ -3,14 +3,15 @@
 //! Nothing here waits, and nothing is allocated after [`Lines::new`].
 
 use rowtone::analyzer::Collector;
-use rowtone::camera::{Line, Pixels};
+use rowtone::camera::{Line, Pixels, UpperBytes};
+use rowtone::raw::{RawError, RawFormat};
 use rowtone::report::{Warning, Warnings};
 use rowtone::spectrum::{self, SampleBuffer};
 use rowtone::timeline::Binner;
 use rowtone::tracker::{self, Counts, Storage, Tracker};
 
 use crate::capture::Frame;
-use crate::clock::FrameClock;
+use crate::clock::{Due, FrameClock};
 use crate::setup::Setup;
 
 /// See the [module](self).
@@ -22,13 +23,20 @@ pub struct Lines<'a> {
     collector: Collector<'a>,
     clock: FrameClock,
     light: Light,
-    /// Where rows of more than 8 bits are unpacked to, or the upper bytes of right-aligned words.
-    words: Vec<u16>,
-    upper: Vec<u8>,
+    room: Room,
+    /// Where a row is brought together whose brightness is looked at.
+    seen: Vec<u8>,
     /// Bytes of a whole frame.
     frame_bytes: usize,
     /// As they were when the last window was complete.
     told: Counts,
+}
+
+/// Where rows of more than 8 bits are unpacked to, or the upper bytes of right-aligned words.
+#[derive(Debug)]
+struct Room {
+    words: Vec<u16>,
+    upper: Vec<u8>,
 }
 
 /// How bright the picture is; shares from 0 to 1.
@@ -50,11 +58,17 @@ impl Light {
     fn of(pixels: Pixels<'_>, bits: u8) -> Self {
         let full = (1u32 << bits) - 1;
         let high = (full - full / 64) as u16;
-        let (mut sum, mut saturated) = (0u64, 0u32);
-        pixels.values().for_each(|value| {
-            sum += u64::from(value);
+        let (mut sum, mut saturated) = (0, 0);
+        let mut add = |value: u16| {
+            sum += u32::from(value); // of at most 65 535 pixels
             saturated += u32::from(value >= high);
-        });
+        };
+        // Each by itself: the compiler finds vectors for what is simple.
+        match pixels {
+            Pixels::U8(p) => p.iter().for_each(|&p| add(p.into())),
+            Pixels::U16(p) => p.iter().for_each(|&p| add(p)),
+            Pixels::Upper(p) => p.iter().for_each(|p| add(p.into())),
+        }
         let n = pixels.len().max(1) as f32;
         Self {
             mean: sum as f32 / n / full as f32,
@@ -115,8 +129,11 @@ impl<'a> Lines<'a> {
                 mean: 0.5,
                 saturated: 0.0,
             },
-            words: vec![0; setup.part.width.into()],
-            upper: vec![0; setup.part.width.into()],
+            room: Room {
+                words: vec![0; setup.part.width.into()],
+                upper: vec![0; setup.part.width.into()],
+            },
+            seen: vec![0; usize::from(setup.part.width) + UpperBytes::SPARE],
             frame_bytes: last_row * shape.stride + line_end,
             told: Counts::default(),
             setup,
@@ -134,27 +151,66 @@ impl<'a> Lines<'a> {
         let Some(due) = self.clock.frame(frame, whole) else {
             return;
         };
+        // Once a frame, not once a line: how a row is cut.
+        let format = self.setup.shape.format;
+        match format {
+            _ if self.setup.tracker.bits > 8 => {
+                self.rows(due, frame.bytes, complete, &|bytes, width, room| {
+                    format.line(bytes, width, &mut room.words)
+                })
+            }
+            RawFormat::Raw8 => self.rows(due, frame.bytes, complete, &|bytes, width, room| {
+                RawFormat::Raw8.upper_line(bytes, width, &mut room.upper)
+            }),
+            RawFormat::Packed10 => self.rows(due, frame.bytes, complete, &|bytes, width, room| {
+                RawFormat::Packed10.upper_line(bytes, width, &mut room.upper)
+            }),
+            RawFormat::Packed12 => self.rows(due, frame.bytes, complete, &|bytes, width, room| {
+                RawFormat::Packed12.upper_line(bytes, width, &mut room.upper)
+            }),
+            RawFormat::Raw16 => self.rows(due, frame.bytes, complete, &|bytes, width, room| {
+                RawFormat::Raw16.upper_line(bytes, width, &mut room.upper)
+            }),
+            RawFormat::Raw10 | RawFormat::Raw12 => {
+                self.rows(due, frame.bytes, complete, &|bytes, width, room| {
+                    format.upper_line(bytes, width, &mut room.upper)
+                })
+            }
+        }
+    }
+
+    /// The rows of a frame that is whole, each cut by `cut` from the bytes that it begins with.
+    #[inline(always)]
+    fn rows(
+        &mut self,
+        due: Due,
+        bytes: &[u8],
+        complete: &mut dyn FnMut(&mut Collector<'a>, Warnings),
+        cut: &impl for<'b> Fn(&'b [u8], usize, &'b mut Room) -> Result<Pixels<'b>, RawError>,
+    ) {
         let Setup {
-            shape, part, group, ..
-        } = self.setup;
-        let start_ns = due.start_ns.saturating_add(self.setup.part_start_ns);
-        let width = usize::from(part.width);
-        let bits = self.setup.tracker.bits;
+            shape,
+            part,
+            group,
+            part_start_ns,
+            ref tracker,
+            ..
+        } = *self.setup;
+        let start_ns = due.start_ns.saturating_add(part_start_ns);
         let first = usize::from(part.y) * shape.stride + shape.format.bytes(part.x.into());
         let looked_at = (due.number % u32::from(part.height)) as u16;
+        let mut rest = bytes.get(first..).unwrap_or_default();
         for row in 0..part.height {
-            let at = first + usize::from(row) * shape.stride;
-            let bytes = frame.bytes.get(at..).unwrap_or_default();
-            let pixels = if bits == 8 {
-                shape.format.upper_line(bytes, width, &mut self.upper)
-            } else {
-                shape.format.line(bytes, width, &mut self.words)
-            };
-            let Ok(pixels) = pixels else {
+            let Ok(pixels) = cut(rest, part.width.into(), &mut self.room) else {
                 return; // `whole` rules it out
             };
             if row == looked_at {
-                self.light.add(Light::of(pixels, bits));
+                let seen = match pixels {
+                    Pixels::Upper(p) => p.gather(tracker.kernel, &mut self.seen).map(Pixels::U8),
+                    _ => Some(pixels),
+                };
+                self.light
+                    .add(Light::of(seen.unwrap_or(pixels), tracker.bits));
             }
             let line = Line {
                 frame: due.number,
@@ -162,6 +218,7 @@ impl<'a> Lines<'a> {
                 start_ns: start_ns.saturating_add(group.timing().start_ns(row)),
                 pixels,
             };
+            rest = rest.get(shape.stride..).unwrap_or_default();
             let Some(sample) = self.tracker.push_into(&line, &mut self.binner) else {
                 continue;
             };

@@ -19,13 +19,6 @@ mod x86_64;
 
 use super::{Kernel, Kind, Sums};
 
-/// Pixels of a step of 16 bytes: what is written stays aligned where the line is.
-#[cfg(any(
-    target_arch = "x86_64",
-    all(target_arch = "aarch64", target_feature = "neon")
-))]
-const STEP: usize = 16;
-
 /// How the bytes lie.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Spread {
@@ -39,8 +32,11 @@ pub(crate) enum Spread {
 
 /// Groups of `BYTES` bytes, in each of which `PIXELS` wanted ones, a divisor of 8, come one after the other from `FIRST`
 /// on.
-struct Groups<const PIXELS: usize, const BYTES: usize, const FIRST: usize>;
+pub(super) struct Groups<const PIXELS: usize, const BYTES: usize, const FIRST: usize>;
 
+/// Side by side.
+#[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
+pub(super) type Bytes = Groups<1, 1, 0>;
 type Packed10 = Groups<4, 5, 0>;
 type Packed12 = Groups<2, 3, 0>;
 type Words = Groups<1, 2, 1>;
@@ -55,22 +51,6 @@ type Words = Groups<1, 2, 1>;
 impl<const PIXELS: usize, const BYTES: usize, const FIRST: usize> Groups<PIXELS, BYTES, FIRST> {
     /// Pixels and bytes of a group, and the first wanted byte.
     const GROUP: (usize, usize, usize) = (PIXELS, BYTES, FIRST);
-
-    /// Bytes of eight pixels.
-    const HALF: usize = 8 / PIXELS * BYTES;
-
-    /// The places of 16 pixels, in two vectors of 16 bytes, the second of which begins [`Self::HALF`] bytes after the
-    /// first: eight in each.
-    const PLACES_IN_TWO: [u8; 16] = {
-        let mut places = [0; 16];
-        let mut x = 0;
-        while x < 8 {
-            places[x] = Self::place(x) as u8;
-            places[x + 8] = places[x] + 16;
-            x += 1;
-        }
-        places
-    };
 
     /// Where pixel `x` lies.
     const fn place(x: usize) -> usize {
@@ -100,21 +80,16 @@ impl<const PIXELS: usize, const BYTES: usize, const FIRST: usize> Groups<PIXELS,
             Kind::Avx2 | Kind::Avx512 { .. } => unsafe { Self::sums_32(bytes, coefficients) },
             // SAFETY: the program was compiled for processors with NEON.
             #[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
-            Kind::Neon => unsafe { Self::sums_neon(bytes, coefficients) },
+            Kind::Neon => return unsafe { Self::sums_neon(bytes, coefficients) },
             // SAFETY: `fastest` made this kind after it asked for the dot product.
             #[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
-            Kind::NeonDot => unsafe { Self::sums_dot(bytes, coefficients) },
+            Kind::NeonDot => return unsafe { Self::sums_dot(bytes, coefficients) },
             _ => (Sums::default(), 0),
         };
-        let rest = coefficients.get(done..).unwrap_or_default();
-        if rest.is_empty() {
+        if done >= coefficients.len() {
             return sums;
         }
-        let pairs = spread.pixels(bytes, done).zip(rest);
-        pairs.fold(sums, |sums, (p, &h)| Sums {
-            product: sums.product + i64::from(p) * i64::from(h),
-            pixels: sums.pixels + u64::from(p),
-        })
+        spread.sums_from(done, bytes, coefficients, sums)
     }
 }
 
@@ -132,6 +107,17 @@ impl Spread {
     pub(crate) fn group_at(self, x: usize) -> Option<usize> {
         let (pixels, bytes, _) = self.group();
         x.is_multiple_of(pixels).then_some(x / pixels * bytes)
+    }
+
+    /// `sums` of the pixels before `first`, and those of the others, in plain Rust.
+    #[inline(never)]
+    fn sums_from(self, first: usize, bytes: &[u8], coefficients: &[i8], sums: Sums) -> Sums {
+        let rest = coefficients.get(first..).unwrap_or_default();
+        let pairs = self.pixels(bytes, first).zip(rest);
+        pairs.fold(sums, |sums, (p, &h)| Sums {
+            product: sums.product + i64::from(p) * i64::from(h),
+            pixels: sums.pixels + u64::from(p),
+        })
     }
 
     /// The pixels from `first` on, one after the other, of the whole groups that are there.

@@ -1,6 +1,6 @@
 //! On x86-64: 16 pixels are picked of two vectors of 16 bytes, or with AVX-512's byte permutation as many as 64 bytes hold.
 
-use super::{Groups, STEP};
+use super::Groups;
 use crate::kernel::Sums;
 use crate::kernel::x86_64::{ask_ahead_of, sum_i32, sum_i64};
 use crate::kernel::x86_64_avx512::{Block, sum};
@@ -8,6 +8,9 @@ use core::arch::x86_64::*;
 
 /// Pixels a block: its sums fit 32 bits, 64·255·2¹⁶ < 2³¹.
 const BLOCK: usize = 1 << 16;
+
+/// Pixels of a step of 16 bytes: what is written stays aligned where the line is.
+const STEP: usize = 16;
 
 /// The lower `count` bits, at most 64.
 const fn below(count: usize) -> u64 {
@@ -19,6 +22,22 @@ const fn below(count: usize) -> u64 {
 }
 
 impl<const PIXELS: usize, const BYTES: usize, const FIRST: usize> Groups<PIXELS, BYTES, FIRST> {
+    /// Bytes of eight pixels.
+    const HALF: usize = 8 / PIXELS * BYTES;
+
+    /// The places of 16 pixels, in two vectors of 16 bytes, the second of which begins [`Self::HALF`] bytes after the
+    /// first: eight in each.
+    const PLACES_IN_TWO: [u8; 16] = {
+        let mut places = [0; 16];
+        let mut x = 0;
+        while x < 8 {
+            places[x] = Self::place(x) as u8;
+            places[x + 8] = places[x] + 16;
+            x += 1;
+        }
+        places
+    };
+
     /// The shuffles that pick eight pixels each, of the first vector to the lower half and of the second to the upper.
     #[inline]
     #[target_feature(enable = "ssse3")]
