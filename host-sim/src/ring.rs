@@ -2,7 +2,8 @@
 //!
 //! A block is handed over when it is full, so two threads that both have work wake each other once a
 //! block, not once a thing; and what comes back is filled again, so nothing is allocated for long. The
-//! sender waits when all blocks are under way, the receiver when none has come.
+//! sender waits when all blocks are under way, the receiver when none has come. Blocks come back by the half of
+//! all: a sender that is ahead is woken rarely, and has much to do then.
 
 use std::collections::VecDeque;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
@@ -30,7 +31,9 @@ pub struct Inlet<T, E> {
     back: SyncSender<Vec<T>>,
     current: VecDeque<T>,
     done: Vec<T>,
-    block: usize,
+    /// Things that have come and are not given back yet, at most, and when so many are, all are.
+    owed: usize,
+    batch: usize,
 }
 
 /// What came.
@@ -65,7 +68,8 @@ pub fn ring<T: Default, E>(blocks: usize, block: usize) -> (Outlet<T, E>, Inlet<
         back,
         current: VecDeque::new(),
         done: Vec::new(),
-        block,
+        owed: 0,
+        batch: blocks.div_ceil(2) * block,
     };
     (outlet, inlet)
 }
@@ -106,26 +110,30 @@ impl<T: Default, E> Inlet<T, E> {
                 return Next::Item(thing);
             }
             match self.from.recv() {
-                Ok(Message::Block(block)) => self.current = block.into(),
+                Ok(Message::Block(block)) => self.take(block),
                 Ok(Message::End(word)) => return Next::End(word),
                 Err(_) => return Next::Gone,
             }
-            self.give_back();
         }
     }
 
     /// Takes a thing back, to be filled again. What is kept instead is replaced by something new.
     pub fn recycle(&mut self, thing: T) {
-        if self.done.len() < self.block {
+        if self.done.len() < self.batch {
             self.done.push(thing);
         }
     }
 
-    /// A block has come: as many things as it had may be filled again.
-    fn give_back(&mut self) {
-        let mut done = std::mem::replace(&mut self.done, Vec::with_capacity(self.block));
-        done.resize_with(self.block, T::default);
-        let _ = self.back.try_send(done);
+    /// A block has come: as many things as it had may be filled again, soon.
+    fn take(&mut self, block: Vec<T>) {
+        self.owed += block.len();
+        self.current = block.into();
+        if self.owed >= self.batch {
+            let mut done = std::mem::replace(&mut self.done, Vec::with_capacity(self.batch));
+            done.resize_with(self.owed, T::default);
+            self.owed = 0;
+            let _ = self.back.try_send(done);
+        }
     }
 }
 
@@ -135,8 +143,8 @@ mod tests {
 
     #[test]
     fn everything_arrives_in_order_then_the_last_word() {
-        for block in [1, 3] {
-            let (mut outlet, mut inlet) = ring::<Vec<u32>, &str>(2, block);
+        for (blocks, block) in [(1, 1), (2, 1), (2, 3), (3, 1), (5, 7), (6, 10)] {
+            let (mut outlet, mut inlet) = ring::<Vec<u32>, &str>(blocks, block);
             let sender = std::thread::spawn(move || {
                 for i in 0..100 {
                     let mut thing = outlet.spare().unwrap();
@@ -162,6 +170,18 @@ mod tests {
             assert!(matches!(inlet.receive(), Next::Gone));
             sender.join().unwrap();
         }
+    }
+
+    #[test]
+    fn things_come_back_by_the_half_of_all() {
+        let (mut outlet, mut inlet) = ring::<u32, ()>(4, 3);
+        let mut send = |count: u32| (0..count).all(|i| outlet.spare().is_some() && outlet.put(i));
+        assert!(send(12));
+        for i in 0..6 {
+            assert!(matches!(inlet.receive(), Next::Item(_)));
+            inlet.recycle(i);
+        }
+        assert!(send(6));
     }
 
     #[test]

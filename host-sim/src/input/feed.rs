@@ -14,11 +14,16 @@ use super::{Camera, CameraArgs, Frame, Turn};
 use crate::failure::Failure;
 use crate::ring::{Inlet, Next as Arrival, Outlet, ring};
 
-/// Blocks of frames ahead of the lines.
-const BLOCKS: usize = 3;
-/// Size of a block, bytes: handing one over costs some 10 µs. Whoever reads a pipe may be waiting for each
+/// Frames of a file ahead of the lines, bytes of luma: enough for the millisecond or two in which the reading thread's
+/// processor computes a report.
+const AHEAD_BYTES: usize = 16 << 20;
+/// But so many frames, of a pipe no more.
+const LEAST_AHEAD: usize = 3;
+/// Blocks of frames ahead of the lines: handing one over costs some 10 µs. Whoever reads a pipe may be waiting for each
 /// frame and gets it at once.
-const BLOCK_BYTES: usize = 4 << 20;
+const BLOCKS: usize = 6;
+/// Most frames of a block.
+const BLOCK_FRAMES: usize = 64;
 
 /// How the reading ended.
 #[derive(Debug)]
@@ -117,11 +122,13 @@ impl Feed {
             None => args.clock(source.header())?,
         };
         let camera = args.camera(source.header(), clock.fps())?;
-        let block = match frames {
-            Some(_) => BLOCK_BYTES / source.header().luma_bytes(),
-            None => 1,
+        let ahead = match frames {
+            Some(_) => AHEAD_BYTES / source.header().luma_bytes(),
+            None => LEAST_AHEAD,
         };
-        let (outlet, inlet) = ring(BLOCKS, block.clamp(1, 64));
+        let block = (ahead / BLOCKS).clamp(1, BLOCK_FRAMES);
+        let blocks = (ahead / block).clamp(LEAST_AHEAD, BLOCKS);
+        let (outlet, inlet) = ring(blocks, block);
         let pts = args.pts.as_ref().map(|p| p.display().to_string());
         let thread = Reading {
             source,

@@ -19,7 +19,7 @@ use super::y4m::{FrameSource, Layout, Next, Reader};
 use crate::failure::Failure;
 
 /// Bytes that are mapped at once; more where a frame is larger.
-const WINDOW_BYTES: usize = 8 << 20;
+const WINDOW_BYTES: usize = 4 << 20;
 
 /// The frames of a Y4M file.
 #[derive(Debug)]
@@ -220,7 +220,7 @@ mod tests {
 
     #[test]
     fn frames_across_the_ends_of_windows_are_whole() {
-        // Frames of 3.75 MB: two fit into a window, the third begins in it.
+        // Frames of 3.75 MB: one fits into a window, the next begins in it.
         let mut bytes = b"YUV4MPEG2 W2500 H1500 Cmono\n".to_vec();
         for k in 0..5u8 {
             bytes.extend(b"FRAME\n");

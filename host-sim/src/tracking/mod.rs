@@ -22,10 +22,11 @@ use crate::input::{Camera, Feed, Rect};
 use crate::memory::TrackerMemory;
 use crate::ring::{Inlet, Next, ring};
 
-/// Blocks of displacements on their way: the lines go on while a report is computed.
+/// Blocks of displacements on their way: the lines go on while a report is computed, which takes a millisecond or two,
+/// of as much as a hundred frames.
 const BLOCKS: usize = 4;
 /// Frames of a block, where nobody waits for each.
-const BLOCK_FRAMES: usize = 8;
+const BLOCK_FRAMES: usize = 32;
 
 /// What the lines of one frame came to.
 #[derive(Debug, Default)]
