@@ -62,14 +62,15 @@ impl Tracker<'_> {
             .or_else(|sums| self.take_with_care(line, pixels, sums))
     }
 
-    /// Takes one whose pixels do not lie side by side.
+    /// Takes one whose pixels do not lie side by side. They are lent: a copy would read as one what was just written
+    /// in parts, and wait for it.
     #[inline(always)]
     pub(super) fn take_scattered(
         &mut self,
         line: &Line<'_>,
-        upper: UpperBytes<'_>,
+        upper: &UpperBytes<'_>,
     ) -> Result<Place, Left> {
-        self.take_quietly(line, &upper)
+        self.take_quietly(line, upper)
             .or_else(|sums| self.take_scattered_with_care(line, upper, sums))
     }
 
@@ -77,11 +78,11 @@ impl Tracker<'_> {
     fn take_scattered_with_care(
         &mut self,
         line: &Line<'_>,
-        upper: UpperBytes<'_>,
+        upper: &UpperBytes<'_>,
         sums: Sums,
     ) -> Result<Place, Left> {
         let room = core::mem::take(&mut self.room);
-        let place = match Scattered::new(upper, self.config.kernel, &mut *room) {
+        let place = match Scattered::new(*upper, self.config.kernel, &mut *room) {
             Some(row) => self.take_with_care(line, row, sums),
             None => Err(self.misfit()),
         };

@@ -205,7 +205,7 @@ impl<'a> Tracker<'a> {
         match line.pixels {
             Pixels::U8(p) => self.push_u8(line, p),
             Pixels::U16(p) => self.push_u16(line, p),
-            Pixels::Upper(p) => self.push_upper(line, p),
+            Pixels::Upper(ref p) => self.push_upper(line, p),
         }
     }
 
@@ -216,7 +216,7 @@ impl<'a> Tracker<'a> {
         match line.pixels {
             Pixels::U8(p) => self.push_u8_into(line, p, binner),
             Pixels::U16(p) => self.push_u16_into(line, p, binner),
-            Pixels::Upper(p) => self.push_upper_into(line, p, binner),
+            Pixels::Upper(ref p) => self.push_upper_into(line, p, binner),
         }
     }
 
@@ -246,7 +246,7 @@ impl<'a> Tracker<'a> {
     }
 
     #[inline(never)]
-    fn push_upper(&mut self, line: &Line<'_>, pixels: UpperBytes<'_>) -> Outcome {
+    fn push_upper(&mut self, line: &Line<'_>, pixels: &UpperBytes<'_>) -> Outcome {
         let place = self.take_scattered(line, pixels);
         self.outcome(line, place)
     }
@@ -255,7 +255,7 @@ impl<'a> Tracker<'a> {
     fn push_upper_into(
         &mut self,
         line: &Line<'_>,
-        pixels: UpperBytes<'_>,
+        pixels: &UpperBytes<'_>,
         binner: &mut Binner,
     ) -> Option<Sample> {
         let place = self.take_scattered(line, pixels);
