@@ -1,4 +1,5 @@
-//! On x86-64: 16 pixels are picked of two vectors of 16 bytes, or with AVX-512's byte permutation as many as 64 bytes hold.
+//! On x86-64: 16 pixels are picked of two vectors of 16 bytes, or with AVX-512's byte permutation
+//! 64 of two of 64 bytes.
 
 use super::Groups;
 use crate::kernel::Sums;
@@ -121,33 +122,49 @@ impl<const PIXELS: usize, const BYTES: usize, const FIRST: usize> Groups<PIXELS,
         (sums, done)
     }
 
-    /// Pixels of a step of 64 bytes: whole groups, and a multiple of 16 as lines mostly are.
-    const STEP_64: usize = 64 / (16 / PIXELS * BYTES) * 16;
+    /// Bytes of 256 pixels: whole vectors of 64.
+    const BYTES_256: usize = 256 / PIXELS * BYTES;
 
-    /// Their places; the last bytes of a step have none.
-    const PLACES_IN_64: [u8; 64] = {
-        let mut places = [0; 64];
+    /// In which of those vectors each 64 pixels begin: they lie in it and the next.
+    const VECTORS: [usize; 4] = {
+        let mut vectors = [0; 4];
+        let mut k = 0;
+        while k < 4 {
+            vectors[k] = Self::place(64 * k) / 64;
+            assert!(64 * (vectors[k] + 2) <= Self::BYTES_256);
+            k += 1;
+        }
+        vectors
+    };
+
+    /// The places of the pixels in both.
+    const PLACES_IN_128: [[u8; 64]; 4] = {
+        let mut places = [[0; 64]; 4];
         let mut x = 0;
-        while x < Self::STEP_64 {
-            places[x] = Self::place(x) as u8;
+        while x < 256 {
+            let place = Self::place(x) - 64 * Self::VECTORS[x / 64];
+            assert!(place < 128);
+            places[x / 64][x % 64] = place as u8;
             x += 1;
         }
         places
     };
 
-    /// Bytes of a step.
-    const BYTES_64: usize = Self::STEP_64 / PIXELS * BYTES;
-
-    /// All ones where a step has a pixel.
-    const LANES_64: [u8; 64] = {
-        let mut lanes = [0; 64];
-        let mut x = 0;
-        while x < Self::STEP_64 {
-            lanes[x] = u8::MAX;
-            x += 1;
+    /// Asks memory for what lies behind the vectors of these 64 pixels.
+    #[inline(always)]
+    fn ask_ahead(k: usize, from: *const u8) {
+        let end = const {
+            [
+                Self::VECTORS[1],
+                Self::VECTORS[2],
+                Self::VECTORS[3],
+                Self::BYTES_256 / 64,
+            ]
+        }[k];
+        for vector in const { Self::VECTORS }[k]..end {
+            ask_ahead_of(from.wrapping_add(64 * vector));
         }
-        lanes
-    };
+    }
 
     /// All sums.
     #[target_feature(enable = "avx512f,avx512bw,avx512vnni,avx512vbmi")]
@@ -156,9 +173,7 @@ impl<const PIXELS: usize, const BYTES: usize, const FIRST: usize> Groups<PIXELS,
         let (mut bytes, mut coefficients) = (bytes, coefficients);
         loop {
             // A line is a block.
-            let now = coefficients
-                .len()
-                .min(BLOCK / Self::STEP_64 * Self::STEP_64);
+            let now = coefficients.len().min(BLOCK);
             let block = Self::block_64(bytes, &coefficients[..now]);
             sums.product += i64::from(block.product);
             sums.pixels += block.pixels as u64;
@@ -170,68 +185,64 @@ impl<const PIXELS: usize, const BYTES: usize, const FIRST: usize> Groups<PIXELS,
         }
     }
 
-    /// Steps of a block, as far as `bytes` go. Two at once hide the latency of the additions.
+    /// Sums of a block, as far as `bytes` go: 256 pixels at a time, the rest 64 at a time.
     #[inline]
     #[target_feature(enable = "avx512f,avx512bw,avx512vnni,avx512vbmi")]
     fn block_64(bytes: &[u8], coefficients: &[i8]) -> Block {
-        // SAFETY: the arrays are 64 bytes long and the loads need no alignment.
-        let (places, lanes) = unsafe {
-            (
-                _mm512_loadu_si512(Self::PLACES_IN_64.as_ptr().cast()),
-                _mm512_loadu_si512(Self::LANES_64.as_ptr().cast()),
-            )
-        };
+        let pixels = coefficients.len().min(bytes.len() / BYTES * PIXELS);
         let (ones, zero) = (_mm512_set1_epi8(1), _mm512_setzero_si512());
+        // SAFETY: the arrays are 64 bytes long and the loads need no alignment.
+        let places = const { &Self::PLACES_IN_128 }
+            .each_ref()
+            .map(|places| unsafe { _mm512_loadu_si512(places.as_ptr().cast()) });
+        // Two sets of sums hide the latency of the additions.
         let (mut product, mut plain) = ([zero; 2], [zero; 2]);
-        let mut add = |side: usize, p: __m512i, h: __m512i| {
-            product[side] = _mm512_dpbusd_epi32(product[side], p, h);
-            plain[side] = _mm512_dpbusd_epi32(plain[side], p, ones);
+        let mut add = |k: usize, p: __m512i, h: __m512i| {
+            product[k % 2] = _mm512_dpbusd_epi32(product[k % 2], p, h);
+            plain[k % 2] = _mm512_dpbusd_epi32(plain[k % 2], p, ones);
         };
-        let (mut at, mut done) = (0, 0);
-        // Whole vectors are read: the last of them ends that much behind its step.
-        while at + Self::BYTES_64 + 64 <= bytes.len()
-            && done + Self::STEP_64 + 64 <= coefficients.len()
-        {
-            for side in [0, 1] {
-                // SAFETY: both vectors lie within their slices, as was just asked for the second turn, and need no
-                // alignment.
-                let (p, h) = unsafe {
-                    let from = bytes.as_ptr().add(at);
-                    ask_ahead_of(from);
+        let (mut from, mut h) = (bytes.as_ptr(), coefficients.as_ptr());
+        for _ in 0..pixels / 256 {
+            for (k, &places) in places.iter().enumerate() {
+                Self::ask_ahead(k, from);
+                let first = 64 * const { Self::VECTORS }[k];
+                // SAFETY: 256 pixels are `BYTES_256` bytes, which both vectors lie in, and they and their coefficients
+                // are there; no load needs alignment.
+                let (low, high, h) = unsafe {
                     (
-                        _mm512_loadu_si512(from.cast()),
-                        _mm512_loadu_si512(coefficients.as_ptr().add(done).cast()),
+                        _mm512_loadu_si512(from.add(first).cast()),
+                        _mm512_loadu_si512(from.add(first + 64).cast()),
+                        _mm512_loadu_si512(h.add(64 * k).cast()),
                     )
                 };
-                add(
-                    side,
-                    _mm512_and_si512(_mm512_permutexvar_epi8(places, p), lanes),
-                    h,
-                );
-                at += Self::BYTES_64;
-                done += Self::STEP_64;
+                add(k, _mm512_permutex2var_epi8(low, places, high), h);
             }
+            (from, h) = (from.wrapping_add(Self::BYTES_256), h.wrapping_add(256));
         }
-        // The rest: what no mask lets through is not read and counts as 0.
-        while done < coefficients.len() && at < bytes.len() {
-            let readable = (bytes.len() - at).min(64);
-            let pixels = (coefficients.len() - done)
-                .min(Self::STEP_64)
-                .min(readable / BYTES * PIXELS);
-            // SAFETY: only bytes below the slices' lengths are let through.
-            let (p, h) = unsafe {
+        // What no mask lets through is not read and counts as 0.
+        let done = pixels / 256 * 256;
+        let there = bytes.len() - done / PIXELS * BYTES;
+        for (k, &places) in places.iter().enumerate() {
+            let left = (pixels - done).saturating_sub(64 * k);
+            if left == 0 {
+                break;
+            }
+            Self::ask_ahead(k, from);
+            let first = 64 * const { Self::VECTORS }[k];
+            let read = |at: usize| below(there.saturating_sub(at));
+            // SAFETY: only bytes and coefficients that are there are let through.
+            let (low, high, h) = unsafe {
                 (
-                    _mm512_maskz_loadu_epi8(below(readable), bytes.as_ptr().add(at).cast()),
-                    _mm512_maskz_loadu_epi8(below(pixels), coefficients.as_ptr().add(done)),
+                    _mm512_maskz_loadu_epi8(read(first), from.wrapping_add(first).cast()),
+                    _mm512_maskz_loadu_epi8(read(first + 64), from.wrapping_add(first + 64).cast()),
+                    _mm512_maskz_loadu_epi8(below(left), h.wrapping_add(64 * k)),
                 )
             };
             add(
-                0,
-                _mm512_maskz_permutexvar_epi8(below(pixels), places, p),
+                k,
+                _mm512_maskz_permutex2var_epi8(below(left), low, places, high),
                 h,
             );
-            at += Self::BYTES_64;
-            done += pixels;
         }
         sum(
             _mm512_add_epi32(product[0], product[1]),
