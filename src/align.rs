@@ -109,6 +109,7 @@ struct All<'a, P> {
 }
 
 impl<P: Pixel> Wide for All<'_, P> {
+    type Out = ();
     #[inline(always)]
     fn run(self) {
         let (averaging, mean, pixels) = (self.averaging, self.mean, self.pixels);

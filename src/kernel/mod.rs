@@ -32,11 +32,13 @@ pub struct Sums {
     pub pixels: u64,
 }
 
-/// A loop that is worth compiling for wide vectors; its `run` must be `#[inline(always)]`, and so must be
+/// Work that is worth compiling for wide vectors; its `run` must be `#[inline(always)]`, and so must be
 /// what it calls.
 pub(crate) trait Wide {
-    /// The loop.
-    fn run(self);
+    /// What comes of it.
+    type Out;
+    /// The work.
+    fn run(self) -> Self::Out;
 }
 
 /// What stands in front of the point of 0 ≤ `v` < 2¹⁶. A cast does the same and is one instruction of most
@@ -154,14 +156,17 @@ impl Kernel {
         slower.into_iter().flatten().chain(better).map(Self)
     }
 
-    /// Runs a loop over floats, compiled for the vectors that this kernel's processor has. The bits are the
+    /// Runs work on floats, compiled for the vectors that this kernel's processor has. The bits are the
     /// same as anywhere: Rust neither reorders float arithmetic nor fuses it.
-    #[inline]
-    pub(crate) fn run<W: Wide>(self, wide: W) {
+    #[inline(always)]
+    pub(crate) fn run<W: Wide>(self, wide: W) -> W::Out {
         match self.0 {
-            // SAFETY: `fastest` made these kinds after it asked the processor for AVX2.
+            // SAFETY: `fastest` made this kind after it asked the processor for AVX2.
             #[cfg(target_arch = "x86_64")]
-            Kind::Avx2 | Kind::Avx512 { .. } => unsafe { x86_64::run(wide) },
+            Kind::Avx2 => unsafe { x86_64::run(wide) },
+            // SAFETY: `fastest` made this kind after it asked for all of AVX-512 that this needs.
+            #[cfg(target_arch = "x86_64")]
+            Kind::Avx512 { .. } => unsafe { x86_64_avx512::run(wide) },
             _ => wide.run(),
         }
     }

@@ -60,8 +60,8 @@ pub(super) fn sum_i64(v: __m256i) -> u64 {
 
 /// See [`super::Kernel::run`].
 #[target_feature(enable = "avx2")]
-pub(super) fn run<W: super::Wide>(wide: W) {
-    wide.run();
+pub(super) fn run<W: super::Wide>(wide: W) -> W::Out {
+    wide.run()
 }
 
 /// How far ahead memory is asked, bytes: some lines, so that the pauses between them are made use of.

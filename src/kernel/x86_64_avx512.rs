@@ -53,6 +53,12 @@ fn load_rest<T>(bytes: &[T]) -> __m512i {
     unsafe { _mm512_maskz_loadu_epi8(mask, bytes.as_ptr().cast()) }
 }
 
+/// See [`super::Kernel::run`].
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni")]
+pub(super) fn run<W: super::Wide>(wide: W) -> W::Out {
+    wide.run()
+}
+
 #[target_feature(enable = "avx512f,avx512bw,avx512vnni")]
 pub(super) fn sums_u8(pixels: &[u8], coefficients: &[i8]) -> Sums {
     let n = pixels.len().min(coefficients.len());

@@ -7,7 +7,7 @@ use super::{CUBICS, OFFSETS_PER_PX, QUADRATICS, RowTable};
 use crate::{
     align::UNKNOWN_STEPS,
     band::{HALFWAY, Level, MAX_HALF, SLOPE},
-    kernel::{Kernel, MAX_COEFFICIENT},
+    kernel::{Kernel, MAX_COEFFICIENT, Wide},
     noise::PixelNoise,
 };
 use core::ops::Range;
@@ -153,7 +153,16 @@ impl Build {
     }
 
     /// Builds a row in one go.
-    pub fn all(mut self, parts: &mut Parts<'_>) -> RowTable {
+    pub fn all(self, parts: &mut Parts<'_>) -> RowTable {
+        if cfg!(target_arch = "x86_64") {
+            self.recipe.kernel.run(All(self, parts))
+        } else {
+            self.in_one_go(parts)
+        }
+    }
+
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
+    fn in_one_go(mut self, parts: &mut Parts<'_>) -> RowTable {
         loop {
             if let Some(table) = self.advance(usize::MAX, parts) {
                 return table;
@@ -164,6 +173,7 @@ impl Build {
     /// Does the next `columns` columns of the present step; the row's table when the last step is done.
     /// The coefficients are overwritten on the way: the row must not be measured before its table is
     /// there. Buffers of the wrong size make a table without texture.
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     pub fn advance(&mut self, columns: usize, parts: &mut Parts<'_>) -> Option<RowTable> {
         let width = parts.mean.len();
         let fits = parts.mask.len() == width
@@ -251,6 +261,7 @@ impl Build {
 
     /// w: a column's mask times the inverse variance of its pixel; 0 beyond the margin and where the pixel
     /// is saturated.
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     fn weigh(&mut self, span: Range<usize>, mean: &[u16], mask: &[u8], w: &mut [f32]) {
         let r = self.recipe;
         // What came in from beyond the ends was not averaged: there the first frame's noise still stands.
@@ -281,6 +292,7 @@ impl Build {
     }
 
     /// h ← −w · band-passed r'.
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     fn derive(&self, span: Range<usize>, mean: &[u16], w: &[f32], h: &mut [f32]) {
         let r = self.recipe;
         let (Some(h), Some(w)) = (h.get_mut(span.clone()), w.get(span.clone())) else {
@@ -310,6 +322,7 @@ impl Build {
 
     /// Where the reference's slope is no larger than its own noise it says nothing and would only let the
     /// line's noise in: a Wiener gain by the energy of nine columns.
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     fn drop_noise(&mut self, span: Range<usize>, mean: &[u16], w: &mut [f32], h: &mut [f32]) {
         let half = self.recipe.level.half_filter();
         let filter_power = 2.0 * half.iter().map(|f| f * f).sum::<f32>() / self.frames;
@@ -345,6 +358,7 @@ impl Build {
         self.energy = running;
     }
 
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     fn balance(&mut self, span: Range<usize>, mean: &[u16], w: &[f32], h: &[f32]) {
         let centre = self.centre(mean.len());
         let (Some(mean), Some(w), Some(h)) =
@@ -365,6 +379,7 @@ impl Build {
     }
 
     /// h ← h − w·(α + β·r), so that Σ h = 0 and Σ h·r = 0.
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     fn orthogonalise(&mut self, span: Range<usize>, mean: &[u16], w: &[f32], h: &mut [f32]) {
         let centre = self.centre(mean.len());
         let (alpha, beta) = self.alpha_beta;
@@ -386,6 +401,7 @@ impl Build {
 
     /// h scaled to whole numbers. Each rounding error is carried on to the next pixel, which keeps the
     /// errors out of the texture's band.
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     fn quantise(
         &mut self,
         span: Range<usize>,
@@ -501,6 +517,17 @@ impl Build {
         table.cubic = rounded(b * CUBICS);
         table.information = (information.to_bits() >> 16) as u16;
         table
+    }
+}
+
+/// [`Build::all`], where vectors are wide.
+struct All<'s, 'a>(Build, &'s mut Parts<'a>);
+
+impl Wide for All<'_, '_> {
+    type Out = RowTable;
+    #[inline(always)]
+    fn run(self) -> RowTable {
+        self.0.in_one_go(self.1)
     }
 }
 

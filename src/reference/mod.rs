@@ -196,6 +196,32 @@ mod tests {
     }
 
     #[test]
+    fn all_kernels_build_the_same_row() {
+        let built = |kernel: Kernel, margin_px: usize| {
+            let mut coefficients = [0; WIDTH];
+            let recipe = Recipe {
+                kernel,
+                margin_px,
+                ..recipe()
+            };
+            let table = Build::new(&recipe, 7.0).all(&mut Parts {
+                mean: &line(0.3, 2.0, 0.0),
+                mask: &core::array::from_fn::<_, WIDTH, _>(|x| 255 - (x % 90) as u8),
+                scratch: &mut [0.0; 2 * WIDTH],
+                coefficients: &mut coefficients,
+            });
+            (table, coefficients)
+        };
+        for margin_px in [0, 13] {
+            let expected = built(Kernel::PORTABLE, margin_px);
+            assert!(expected.0.has_texture());
+            for kernel in Kernel::all() {
+                assert_eq!(built(kernel, margin_px), expected, "{kernel:?}");
+            }
+        }
+    }
+
+    #[test]
     fn a_row_is_sixteen_bytes() {
         assert_eq!(size_of::<RowTable>(), 16);
     }
