@@ -1,6 +1,6 @@
 //! On 64-bit Arm: 64 pixels are four table look-ups, each in two neighbouring vectors of 16 bytes.
 
-use super::Groups;
+use super::{Groups, Packed10};
 use core::arch::aarch64::*;
 
 /// Bytes of a step of any kind, at most.
@@ -44,19 +44,34 @@ impl<const PIXELS: usize, const BYTES: usize, const FIRST: usize> Groups<PIXELS,
     #[inline]
     #[target_feature(enable = "neon")]
     pub(in crate::kernel) unsafe fn pixels_64(step: *const u8) -> [uint8x16_t; 4] {
-        // SAFETY: vectors up to `STEP_BYTES` lie within the step.
-        let vector = |vector: usize| unsafe { vld1q_u8(step.add(16 * vector)) };
         let pick = |k: usize| {
-            let first = const { Self::VECTORS }[k];
             if PIXELS == BYTES {
-                return vector(first);
+                // SAFETY: the vector lies within the step.
+                return unsafe { vld1q_u8(step.add(16 * k)) };
             }
-            let places = &const { Self::PLACES }[k];
-            // SAFETY: the array is 16 bytes long and the load needs no alignment.
-            let places = unsafe { vld1q_u8(places.as_ptr()) };
-            vqtbl2q_u8(uint8x16x2_t(vector(first), vector(first + 1)), places)
+            // SAFETY: the caller says so.
+            unsafe { Self::pick(step, k, &const { Self::PLACES }[k]) }
         };
         [pick(0), pick(1), pick(2), pick(3)]
+    }
+
+    /// Of a step the bytes at `places`, as [`Self::PLACES`] says.
+    ///
+    /// # Safety
+    /// As of [`Self::pixels_64`].
+    #[inline]
+    #[target_feature(enable = "neon")]
+    unsafe fn pick(step: *const u8, k: usize, places: &[u8; 16]) -> uint8x16_t {
+        let first = 16 * const { Self::VECTORS }[k];
+        // SAFETY: both vectors lie within the step, as `PLACES` made sure, and the array is 16 bytes long; no load needs
+        // alignment.
+        let (both, places) = unsafe {
+            (
+                uint8x16x2_t(vld1q_u8(step.add(first)), vld1q_u8(step.add(first + 16))),
+                vld1q_u8(places.as_ptr()),
+            )
+        };
+        vqtbl2q_u8(both, places)
     }
 
     /// See [`super::Kernel::gather`].
@@ -91,6 +106,51 @@ impl<const PIXELS: usize, const BYTES: usize, const FIRST: usize> Groups<PIXELS,
         // SAFETY: the array is at least a step.
         store(unsafe { Self::pixels_64(step.as_ptr()) }, to);
         there / BYTES * PIXELS
+    }
+}
+
+impl Packed10 {
+    /// Where the lower bits of each pixel are, as [`Self::PLACES`].
+    const PLACES_OF_LOWER: [[u8; 16]; 4] = {
+        let mut places = [[0; 16]; 4];
+        let mut x = 0;
+        while x < 64 {
+            let place = x / 4 * 5 + 4 - 16 * Self::VECTORS[x / 16];
+            assert!(place < 32);
+            places[x / 16][x % 16] = place as u8;
+            x += 1;
+        }
+        places
+    };
+
+    /// See [`super::unpack_10`].
+    #[target_feature(enable = "neon")]
+    pub(super) fn unpack_neon(from: &[u8], to: &mut [u16]) -> usize {
+        const RIGHT: [i8; 16] = [0, -2, -4, -6, 0, -2, -4, -6, 0, -2, -4, -6, 0, -2, -4, -6];
+        // SAFETY: the array is 16 bytes long and the load needs no alignment.
+        let right = unsafe { vld1q_s8(RIGHT.as_ptr()) };
+        let (steps, _) = to.as_chunks_mut::<64>();
+        let mut done = 0;
+        for (p, step) in from.chunks_exact(Self::STEP_BYTES).zip(steps) {
+            // SAFETY: the chunk is a step.
+            let high = unsafe { Self::pixels_64(p.as_ptr()) };
+            let (parts, _) = step.as_chunks_mut::<16>();
+            for (k, part) in parts.iter_mut().enumerate() {
+                // SAFETY: the chunk is a step.
+                let low = unsafe { Self::pick(p.as_ptr(), k, &const { Self::PLACES_OF_LOWER }[k]) };
+                let low = vandq_u8(vshlq_u8(low, right), vdupq_n_u8(3));
+                let (high, to) = (high[k], part.as_mut_ptr());
+                let first = vaddw_u8(vshll_n_u8::<2>(vget_low_u8(high)), vget_low_u8(low));
+                let second = vaddw_high_u8(vshll_high_n_u8::<2>(high), low);
+                // SAFETY: the array is 16 words long and the stores need no alignment.
+                unsafe {
+                    vst1q_u16(to, first);
+                    vst1q_u16(to.add(8), second);
+                }
+            }
+            done += 64;
+        }
+        done
     }
 }
 

@@ -154,6 +154,19 @@ impl Kernel {
     }
 }
 
+/// Unpacks whole pixels of 10 bits as far as the processor has an own way; how many.
+#[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
+pub(crate) fn unpack_10(from: &[u8], to: &mut [u16]) -> usize {
+    // SAFETY: the program was compiled for processors with NEON.
+    unsafe { Packed10::unpack_neon(from, to) }
+}
+
+/// No own way.
+#[cfg(not(all(target_arch = "aarch64", target_feature = "neon")))]
+pub(crate) const fn unpack_10(_: &[u8], _: &mut [u16]) -> usize {
+    0
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
