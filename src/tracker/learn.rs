@@ -57,6 +57,11 @@ const OWN_INFORMATION_PER_PX2: f32 = 25.0;
 /// Rows on which the levels of the band are tried.
 const TRIAL_ROWS: usize = 24;
 
+/// A coarser level that finds this share of the most information is taken: it costs a two-hundredth of the noise, and the
+/// reference's own noise, which the lines that it was learned from share, pulls their shifts less. A handful of frames
+/// had 32 false peaks where the finest was taken for a thousandth more, and none so.
+const AS_MUCH: f32 = 0.99;
+
 /// One row in so many measures the pixels' noise, in turns.
 const NOISE_ROWS: usize = 4;
 
@@ -243,7 +248,7 @@ impl Tracker<'_> {
         };
     }
 
-    /// The level that finds the most information in the picture.
+    /// The level that finds the most information in the picture: the coarsest of those that find about as much.
     fn choose_level(&mut self) {
         let rows = usize::from(self.config.rows);
         let step = rows.div_ceil(TRIAL_ROWS).max(1);
@@ -256,8 +261,8 @@ impl Tracker<'_> {
                 let table = self.storage.tables.get(row);
                 information += table.map_or(0.0, RowTable::information_per_px2);
             }
-            if information > best.0 {
-                best = (information, level);
+            if information > best.0 * AS_MUCH {
+                best = (information.max(best.0), level);
             }
         }
         self.recipe.level = best.1;
