@@ -49,6 +49,8 @@ impl Blur {
     /// More than this leaves no texture to tell it from, px².
     const MOST_PX2: f32 = 6.0;
     const MEMORY_ROWS: f32 = 4096.0;
+    /// Beyond this, a period of fifteen rows, parabolas tell little of it, squared rad a row.
+    const MOST_OMEGA2: f32 = 0.15;
 
     pub(super) fn new(timing: &Timing) -> Self {
         let rows = if timing.is_global_shutter() {
@@ -83,17 +85,22 @@ impl Blur {
         self.change2 += (change_px * change_px - self.change2) / Self::MEMORY_ROWS;
     }
 
+    /// ω², in squared rad a row, of the tone that the motion mostly is; 0 while that is not known. Through four rows the
+    /// speed comes out too large by 47/60 ω² and the change too small by 5/24 ω².
+    fn omega2(&self) -> f32 {
+        if self.speed2 == 0.0 {
+            return 0.0;
+        }
+        let seen = (self.change2 / self.speed2).min(Self::MOST_OMEGA2);
+        seen * (1.0 + 2.0 * seen)
+    }
+
     /// The path of a row.
     fn path(&self, speed_px: f32, change_px: f32) -> Smear {
         let exposure2 = self.exposure_rows * self.exposure_rows;
         let speed2 = speed_px * speed_px * exposure2 / 12.0;
-        let omega2 = match self.speed2 {
-            0.0 => 0.0,
-            speed2 => self.change2 / speed2,
-        };
-        // The rows' second difference is that of the row before.
-        let change = (change_px - omega2 * speed_px) * exposure2;
-        let turn = (omega2 * exposure2 / 30.0).min(0.3);
+        let change = change_px * exposure2;
+        let turn = (self.omega2() * exposure2 / 30.0).min(0.3);
         let finite = 1.0 + turn * (1.0 + 2.0 * turn);
         let variance_px2 = speed2 * finite + change * change / 720.0;
         Smear {
@@ -123,8 +130,9 @@ impl Tracker<'_> {
         shift_px: f32,
     ) -> f32 {
         let information = table.information_per_px2();
-        let (speed_px, change_px) = self.prediction.motion(row, shift_px, information);
-        self.blur.add(speed_px, change_px);
+        let motion = self.prediction.motion(row, shift_px, information);
+        self.blur.add(motion.speed_px, motion.change_px);
+        let (speed_px, change_px) = motion.of_tone(self.blur.omega2());
         let path = self.blur.path(speed_px, change_px);
         if self.stage == Stage::Refining {
             self.blur.sum_px2 += path.variance_px2;
@@ -165,6 +173,7 @@ impl Tracker<'_> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::predict::Prediction;
     use super::*;
 
     /// Path of a tone of `omega` rad a row and 4 px over an exposure of 5.94 rows around `phase`: its mean,
@@ -189,20 +198,24 @@ mod tests {
         // The mean over the exposure is a sine, only weaker.
         let weaker = exact(omega, core::f32::consts::FRAC_PI_2).0;
         let tone = |row: f32| weaker * libm::sinf(omega * row);
-        let differences = |row: f32| {
-            let (here, last, before) = (tone(row), tone(row - 1.0), tone(row - 2.0));
-            (
-                1.5 * here - 2.0 * last + 0.5 * before,
-                here - 2.0 * last + before,
-            )
+        let motion = |row: f32| {
+            let mut prediction = Prediction::default();
+            // A jump, so that the motion counts as swift.
+            prediction.add(0, 9.0, 1e6);
+            for before in (1..8u8).rev() {
+                prediction.add(8 - usize::from(before), tone(row - f32::from(before)), 1e6);
+            }
+            prediction.motion(8, tone(row), 1e6)
         };
         let mut blur = Blur::new(&timing);
         for row in 0..16_000u16 {
-            let (speed, change) = differences(f32::from(row % 3000));
-            blur.add(speed, change);
+            let seen = motion(f32::from(row % 3000));
+            blur.add(seen.speed_px, seen.change_px);
         }
+        let off = blur.omega2() / (omega * omega) - 1.0;
+        assert!(off.abs() < 0.03, "{off}");
         for row in (0..60u16).map(f32::from) {
-            let (speed, change) = differences(row);
+            let (speed, change) = motion(row).of_tone(blur.omega2());
             let path = blur.path(speed, change);
             let (mean, variance, skew) = exact(omega, omega * row);
             assert!((mean - tone(row)).abs() < 1e-3);
