@@ -7,10 +7,10 @@
 use super::{MAX_COEFFICIENT, Sums, portable, spread::Groups};
 use core::arch::{aarch64::*, asm};
 
-/// Steps a block with dot products: 1024·64·255·128 < 2³¹, so a whole block's sums fit 32 bits.
+/// Steps a block with dot products: 1025·64·255·128 < 2³¹, so the sums of a whole block and what is left fit 32 bits.
 const STEPS_DOT: usize = 1024;
 /// Without: a lane of 16 bits of the pixel sum gains 2·2·255 a step, 64 steps fit.
-const STEPS: usize = 64;
+const STEPS: usize = 63;
 /// Deep pixels: a lane of the products gains 2·65535·128 a step of 16 pixels, 128 steps stay below 2³¹.
 const BLOCK_U16: usize = 2048;
 
@@ -27,6 +27,26 @@ pub(super) fn has_dot_product() -> bool {
         cfg!(target_feature = "dotprod")
     }
 }
+
+/// The last 64 pixels of a line whose steps leave less.
+struct Last<'a> {
+    /// From the first one's group on.
+    pixels: &'a [u8],
+    h: &'a [i8; 64],
+    /// So many at its end are what is left.
+    left: usize,
+}
+
+/// Zeros, then all ones: 64 from some place on let so many pixels at their end through.
+const MASKS: [u8; 128] = {
+    let mut masks = [0; 128];
+    let mut x = 64;
+    while x < 128 {
+        masks[x] = u8::MAX;
+        x += 1;
+    }
+    masks
+};
 
 impl Sums {
     /// Of both.
@@ -82,26 +102,56 @@ impl<const PIXELS: usize, const BYTES: usize, const FIRST: usize> Groups<PIXELS,
     #[target_feature(enable = "neon")]
     pub(super) fn sums_neon(bytes: &[u8], coefficients: &[i8]) -> Sums {
         let steps = Self::steps(bytes, coefficients);
+        if steps.len() > STEPS || steps.len() * 64 != coefficients.len() {
+            return Self::uneven_neon(bytes, coefficients);
+        }
+        // SAFETY: `steps` are those that `bytes` has pixels for.
+        unsafe { Self::block(bytes.as_ptr(), steps, None) }
+    }
+
+    #[inline(never)]
+    #[target_feature(enable = "neon")]
+    fn uneven_neon(bytes: &[u8], coefficients: &[i8]) -> Sums {
+        let steps = Self::steps(bytes, coefficients);
         if steps.len() > STEPS {
             // SAFETY: this processor has what this function needs.
             return unsafe { Self::in_parts(bytes, coefficients, STEPS, Self::sums_neon) };
         }
+        let last = Self::last(bytes, coefficients, steps.len());
         // SAFETY: `steps` are those that `bytes` has pixels for.
-        let sums = unsafe { Self::block(bytes.as_ptr(), steps) };
-        Self::and_rest(sums, bytes, coefficients, steps.len())
+        let sums = unsafe { Self::block(bytes.as_ptr(), steps, last.as_ref()) };
+        match last {
+            Some(_) => sums,
+            None => Self::and_rest(sums, bytes, coefficients, steps.len()),
+        }
     }
 
     /// As [`Self::sums_neon`], with the dot-product instructions.
     #[target_feature(enable = "neon,dotprod")]
     pub(super) fn sums_dot(bytes: &[u8], coefficients: &[i8]) -> Sums {
         let steps = Self::steps(bytes, coefficients);
+        if steps.len() > STEPS_DOT || steps.len() * 64 != coefficients.len() {
+            return Self::uneven_dot(bytes, coefficients);
+        }
+        // SAFETY: `steps` are those that `bytes` has pixels for.
+        unsafe { Self::block_dot(bytes.as_ptr(), steps, None) }
+    }
+
+    #[inline(never)]
+    #[target_feature(enable = "neon,dotprod")]
+    fn uneven_dot(bytes: &[u8], coefficients: &[i8]) -> Sums {
+        let steps = Self::steps(bytes, coefficients);
         if steps.len() > STEPS_DOT {
             // SAFETY: this processor has what this function needs.
             return unsafe { Self::in_parts(bytes, coefficients, STEPS_DOT, Self::sums_dot) };
         }
+        let last = Self::last(bytes, coefficients, steps.len());
         // SAFETY: `steps` are those that `bytes` has pixels for.
-        let sums = unsafe { Self::block_dot(bytes.as_ptr(), steps) };
-        Self::and_rest(sums, bytes, coefficients, steps.len())
+        let sums = unsafe { Self::block_dot(bytes.as_ptr(), steps, last.as_ref()) };
+        match last {
+            Some(_) => sums,
+            None => Self::and_rest(sums, bytes, coefficients, steps.len()),
+        }
     }
 
     /// The coefficients of the whole steps.
@@ -131,17 +181,38 @@ impl<const PIXELS: usize, const BYTES: usize, const FIRST: usize> Groups<PIXELS,
         })
     }
 
-    /// `sums` of the whole steps, and of what is left.
+    /// What so many steps leave, as the last 64 pixels of the line; none where they do not begin with a group.
     #[inline(always)]
-    fn and_rest(sums: Sums, bytes: &[u8], coefficients: &[i8], steps: usize) -> Sums {
-        if coefficients.len() == steps * 64 {
-            return sums;
+    fn last<'a>(bytes: &'a [u8], coefficients: &'a [i8], steps: usize) -> Option<Last<'a>> {
+        let n = coefficients.len();
+        let left = n - steps * 64;
+        if left == 0 || left >= 64 || !n.is_multiple_of(PIXELS) {
+            return None;
         }
-        Self::rest(sums, bytes, coefficients, steps)
+        let h = coefficients.last_chunk::<64>()?;
+        let pixels = bytes.get(..n / PIXELS * BYTES)?;
+        let pixels = pixels.get((n - 64) / PIXELS * BYTES..)?;
+        Some(Last { pixels, h, left })
     }
 
+    /// Its pixels, zeros in place of those that were in the steps before.
+    #[inline]
+    #[target_feature(enable = "neon")]
+    fn last_pixels(last: &Last<'_>) -> [uint8x16_t; 4] {
+        assert!(last.pixels.len() >= Self::STEP_BYTES);
+        // SAFETY: a step's bytes are there, as was just asked.
+        let p = unsafe { Self::pixels_64(last.pixels.as_ptr()) };
+        let (masks, _) = MASKS[last.left.min(64)..].as_chunks::<16>();
+        [0, 1, 2, 3].map(|k| {
+            // SAFETY: the array is 16 bytes long and the load needs no alignment.
+            vandq_u8(p[k], unsafe { vld1q_u8(masks[k].as_ptr()) })
+        })
+    }
+
+    /// `sums` of the whole steps, and of what is left, brought together.
+    #[cold]
     #[inline(never)]
-    fn rest(sums: Sums, bytes: &[u8], coefficients: &[i8], steps: usize) -> Sums {
+    fn and_rest(sums: Sums, bytes: &[u8], coefficients: &[i8], steps: usize) -> Sums {
         let bytes = bytes.get(steps * Self::STEP_BYTES..).unwrap_or_default();
         let coefficients = coefficients.get(steps * 64..).unwrap_or_default();
         let mut pixels = [0; 64];
@@ -155,13 +226,14 @@ impl<const PIXELS: usize, const BYTES: usize, const FIRST: usize> Groups<PIXELS,
     /// From `from` on there are as many steps as of coefficients.
     #[inline]
     #[target_feature(enable = "neon")]
-    unsafe fn block(mut from: *const u8, coefficients: &[[i8; 64]]) -> Sums {
+    unsafe fn block(
+        mut from: *const u8,
+        coefficients: &[[i8; 64]],
+        last: Option<&Last<'_>>,
+    ) -> Sums {
         let mut product = [vdupq_n_u32(0); 2];
         let mut pixels = [vdupq_n_u16(0); 2];
-        for h in coefficients {
-            // SAFETY: a step's bytes are there, as the caller says.
-            let (p, h) = (unsafe { Self::pixels_64(from) }, unsigned_64(h));
-            from = from.wrapping_add(Self::STEP_BYTES);
+        let mut add = |p: [uint8x16_t; 4], h: [uint8x16_t; 4]| {
             for k in 0..4 {
                 // Two products of at most 255·128 a lane stay in 16 bits.
                 let pair = vmull_u8(vget_low_u8(p[k]), vget_low_u8(h[k]));
@@ -169,6 +241,14 @@ impl<const PIXELS: usize, const BYTES: usize, const FIRST: usize> Groups<PIXELS,
                 product[k % 2] = vpadalq_u16(product[k % 2], pair);
                 pixels[k % 2] = vpadalq_u8(pixels[k % 2], p[k]);
             }
+        };
+        for h in coefficients {
+            // SAFETY: a step's bytes are there, as the caller says.
+            add(unsafe { Self::pixels_64(from) }, unsigned_64(h));
+            from = from.wrapping_add(Self::STEP_BYTES);
+        }
+        if let Some(last) = last {
+            add(Self::last_pixels(last), unsigned_64(last.h));
         }
         // A lane of both products together fits, and so does the sum of all pixels.
         offset_off(
@@ -181,18 +261,27 @@ impl<const PIXELS: usize, const BYTES: usize, const FIRST: usize> Groups<PIXELS,
     /// As of [`Self::block`].
     #[inline]
     #[target_feature(enable = "neon,dotprod")]
-    unsafe fn block_dot(mut from: *const u8, coefficients: &[[i8; 64]]) -> Sums {
+    unsafe fn block_dot(
+        mut from: *const u8,
+        coefficients: &[[i8; 64]],
+        last: Option<&Last<'_>>,
+    ) -> Sums {
         // Two sets of sums hide the latency of the dot products.
         let (mut product, mut pixels) = ([vdupq_n_u32(0); 2], [vdupq_n_u32(0); 2]);
         let ones = vdupq_n_u8(1);
-        for h in coefficients {
-            // SAFETY: a step's bytes are there, as the caller says.
-            let (p, h) = (unsafe { Self::pixels_64(from) }, unsigned_64(h));
-            from = from.wrapping_add(Self::STEP_BYTES);
+        let mut add = |p: [uint8x16_t; 4], h: [uint8x16_t; 4]| {
             for k in 0..4 {
                 product[k % 2] = dot(product[k % 2], p[k], h[k]);
                 pixels[k % 2] = dot(pixels[k % 2], p[k], ones);
             }
+        };
+        for h in coefficients {
+            // SAFETY: a step's bytes are there, as the caller says.
+            add(unsafe { Self::pixels_64(from) }, unsigned_64(h));
+            from = from.wrapping_add(Self::STEP_BYTES);
+        }
+        if let Some(last) = last {
+            add(Self::last_pixels(last), unsigned_64(last.h));
         }
         // A lane of both together fits.
         offset_off(
