@@ -2,11 +2,14 @@
 # Instructions that a line takes on the processors of a Raspberry Pi 5 and 4, in the core alone and in this program:
 # examples/cost.rs, built for them and run under emulation, with a counter (instructions.c) as the emulator's plugin.
 #
-#   boards/rpi/ci/instructions.sh [functions]     (functions: those of more than one instruction a line, too)
+#   boards/rpi/ci/instructions.sh [functions|totals] [COLUMNS]
+#
+# functions: those of more than one instruction a line, too. Lines have 640 columns where nothing else is said.
 #
 # Needs what tools/aarch64-cargo.sh needs, a C compiler, and Debian's qemu-user (the static one takes no plugins).
 set -euo pipefail
 
+what=${1:-totals} columns=${2:-640}
 root=$(cd "$(dirname "$0")/../../.." && pwd)
 cd "$root"
 command -v qemu-aarch64 >/dev/null || {
@@ -24,7 +27,7 @@ few=20 many=60 lines=$(((60 - 20) * 2 * 480))
 
 count() { # PROCESSOR FORMAT PART ROUNDS
     qemu-aarch64 -cpu "$1" -L /usr/aarch64-linux-gnu -plugin "$work/instructions.so" -d plugin \
-        "$program" "$2" "$3" "$4" 2>"$work/$4" >/dev/null
+        "$program" "$2" "$3" "$4" "$columns" 2>"$work/$4" >/dev/null
 }
 
 a_line() { # PROCESSOR FORMAT PART: sets $insn
@@ -47,12 +50,12 @@ for processor in cortex-a76 cortex-a72; do
         if [ "$ready" != "$before" ]; then
             a_line $processor "$format" core
             core=$insn before=$ready
-            echo "$processor: $core instructions a line of 640 px in the core, $ready bits"
-            [ -z "${1:-}" ] || functions
+            echo "$processor: $core instructions a line of $columns px in the core, $ready bits"
+            [ "$what" != functions ] || functions
         fi
         a_line $processor "$format" program
         awk -v core="$core" -v all="$insn" -v format="$format" \
             'BEGIN { printf "%26s  %5d with this program: %+.1f %%\n", format, all, 100 * (all / core - 1) }'
-        [ -z "${1:-}" ] || functions
+        [ "$what" != functions ] || functions
     done
 done

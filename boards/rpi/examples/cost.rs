@@ -4,7 +4,7 @@
 //!
 //! The same frames go through tracker, binner and collector directly, their rows lying ready as the core wants
 //! them, and through this program's line path (frame clock, rows cut out of the frame, unpacking, light meter).
-//! `cost FORMAT core ROUNDS` and `cost FORMAT program ROUNDS` run one of the two, so many rounds of few frames: for a
+//! `cost FORMAT core ROUNDS [COLUMNS]` and `cost FORMAT program …` run one of the two, so many rounds of few frames: for a
 //! counter of instructions, which compares two numbers of rounds (`boards/rpi/ci/instructions.sh`).
 //!
 //! Times are the thread's own processor time, the shortest of many rounds: other programs do not count.
@@ -80,13 +80,14 @@ fn main() {
     let wanted = words.next().unwrap_or_default(); // all of them
     let counted_part = words.next().unwrap_or_default();
     let counted: Option<usize> = words.next().and_then(|rounds| rounds.parse().ok());
+    let columns = words.next().and_then(|columns| columns.parse().ok());
     // Emulators take their time.
     let learn = match counted {
         Some(_) => "[camera]\nlearn_frames = 4\n",
         None => "[camera]\n",
     };
     let scene = Scene {
-        width: 640,
+        width: columns.unwrap_or(640),
         height: 480,
         line_time_s: 20e-6,
         paced: false,
