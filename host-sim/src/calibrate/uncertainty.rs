@@ -21,6 +21,8 @@ use crate::linear::dot;
 const ROWS_COUNT_FOR: f64 = 12.0;
 /// Residuals are correlated over no more than this part of the frame: over more, an estimate would rest on few pieces.
 const MOST_LAGS: usize = 16;
+/// Fewer degrees of freedom than this are taken for this many.
+const LEAST_FREEDOM: f64 = 4.0;
 /// Lags in a row that must be insignificant.
 const SILENT_LAGS: usize = 5;
 
@@ -28,10 +30,11 @@ const SILENT_LAGS: usize = 5;
 /// together. What the fit itself has taken from the residuals is made up for in `influence` already.
 pub(super) fn variance(influence: &[Vec<f64>], residual: &[Vec<f64>]) -> f64 {
     let height = residual.first().map_or(0, Vec::len);
-    let over_rows = rows(influence, correlated_lags(residual, height / MOST_LAGS));
+    let lags = correlated_lags(residual, height / MOST_LAGS);
+    let over_rows = rows(influence, lags);
     let frames = influence.len() as f64;
     if frames < 2.0 {
-        return over_rows;
+        return over_rows * students(freedom(influence, lags), lags);
     }
     let between: f64 = influence
         .iter()
@@ -74,6 +77,28 @@ fn product(series: &[Vec<f64>], lag: usize) -> f64 {
         .sum()
 }
 
+/// By how much the variance must be larger for error over deviation to have a mean square of 1: it follows Student's t.
+/// Not where rows tell one by one: there are hundreds of them.
+fn students(freedom: f64, lags: usize) -> f64 {
+    let free = freedom.max(LEAST_FREEDOM);
+    if lags == 0 { 1.0 } else { free / (free - 2.0) }
+}
+
+/// Degrees of freedom of [`rows`]: as many as the values that count, less where a product's weights reach over several.
+fn freedom(influence: &[Vec<f64>], last: usize) -> f64 {
+    let (mut square, mut fourth) = (0.0, 0.0);
+    for u in influence.iter().flatten() {
+        square += u * u;
+        fourth += u.powi(4);
+    }
+    // Of normal values that all count alike this is their number.
+    let values = 3.0 * square * square / fourth.max(f64::MIN_POSITIVE);
+    let weights: f64 = (1..=2 * last)
+        .map(|lag| (2.0 - lag as f64 / last as f64).min(1.0).powi(2))
+        .sum();
+    values / (1.0 + 2.0 * weights)
+}
+
 /// Variance of the sum: products up to `last` apart count fully, then ever less up to twice that (a flat top).
 fn rows(influence: &[Vec<f64>], last: usize) -> f64 {
     let white = product(influence, 0);
@@ -111,6 +136,21 @@ mod tests {
     #[test]
     fn white_noise_hangs_together_over_no_rows() {
         assert_eq!(correlated_lags(&noise(4, 300, 1), 75), 0);
+    }
+
+    /// White values count one by one; where products of rows up to four apart count, for far fewer.
+    #[test]
+    fn rows_that_hang_together_tell_less() {
+        let white = noise(1, 300, 1);
+        // Uniform values have a fourth moment of 1.8 times the square of their variance, not 3.
+        let all = freedom(&white, 0);
+        assert!((all / 500.0 - 1.0).abs() < 0.1, "{all}");
+        let weights = 1.0 + 2.0 * (4.0 + 0.5625 + 0.25 + 0.0625);
+        let few = freedom(&white, 4);
+        assert!((few * weights / all - 1.0).abs() < 1e-9);
+        assert_eq!(students(few, 0), 1.0);
+        assert!((students(few, 4) - few / (few - 2.0)).abs() < 1e-12);
+        assert_eq!(students(0.5, 4), 2.0);
     }
 
     /// The sum of 300 running sums of 4 has nearly 16 times the variance of the sum of 300 white values.
