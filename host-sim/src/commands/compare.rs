@@ -16,10 +16,10 @@ use crate::sim::{Config, Scene, Tone};
 /// Options of `rowtone compare`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
-Columns: noise of a row over its own Cramér–Rao bound, after the tone's gain is fitted (median over the
-seeds; least to largest); error of the amplitude (median; the worst); error of the frequency, searched
-within 5 Hz; the largest peak at ±1 to ±3 times the frame rate from the tone, over the tone (median);
-wall time of a line on one thread (least).
+Columns: noise of a row over its own Cramér–Rao bound, after the tone's gain is fitted (median over
+the seeds; least to largest); error of the amplitude (median; the worst); error of the frequency,
+searched within 5 Hz; the largest peak at ±1 to ±3 times the frame rate from the tone, over the
+tone (median); wall time of a line on one thread (least).
 
 Example:
   rowtone compare --scene photo --seeds 3 --plot compare.svg")]

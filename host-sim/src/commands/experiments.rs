@@ -9,8 +9,9 @@ use crate::restore::{Method, sounds, table};
 /// Options of `rowtone experiments`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
-Writes a table (.md), figures (.svg, .png) and sounds (.wav) of each experiment. Everything takes some
-ten minutes and 2 GB of memory, --quick about one minute.
+Writes a table (.md), figures (.svg, .png) and sounds (.wav) of each experiment. Everything takes
+some ten minutes and 1 GB of memory, --quick about one minute; --sound-cols 1040 half an hour and
+3 GB.
 
 Example:
   rowtone experiments --out results --only tones --quick")]
@@ -33,6 +34,9 @@ pub struct Args {
     /// Which recordings of ramp, music, speech and phone: their surface and noise
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
+    /// Specks of 0.7 px before a lens that passes 0.25 cycles/px, instead of 2 px and 0.1: tones, ramp, music, speech
+    #[arg(long)]
+    pub sharp: bool,
     /// Amplitude of the single tones, px
     #[arg(long, value_name = "A", default_value_t = 0.5)]
     pub amplitude_px: f64,
@@ -74,7 +78,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     };
     scale.tone_cols = args.cols.unwrap_or(scale.tone_cols);
     scale.sound_cols = args.sound_cols.unwrap_or(scale.sound_cols);
-    scale.seed = args.seed;
+    (scale.seed, scale.sharp) = (args.seed, args.sharp);
     if wanted(Experiment::Filling) {
         folder.table("filling.md", &table::markdown())?;
         filled_sounds(&folder)?;

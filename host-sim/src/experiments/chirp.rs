@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use super::film::{Film, Setup};
 use super::sound::{Sound, compared, hear, truth};
-use super::{Folder, Scale, working_on};
+use super::{Folder, Scale};
 use crate::failure::Failure;
 use crate::figure::shades::Panels;
 use crate::restore::stft::spectrogram;
@@ -48,7 +48,7 @@ fn followed(sound: &Sound, ramp: &Chirp) -> (f64, f64) {
 /// # Errors
 /// [`Failure`] for what cannot be simulated or written.
 pub fn run(folder: &Folder, scale: Scale) -> Result<(), Failure> {
-    let setup = Setup::thesis(scale.sound_cols, scale.sound_frames, scale.seed);
+    let setup = Setup::thesis(scale.sound_cols, scale.sound_frames, scale.seed).sharp(scale.sharp);
     let ramp = ramp(f64::from(scale.sound_frames) / setup.sensor.fps);
     let motion = Motion {
         chirps: vec![ramp],
@@ -56,10 +56,13 @@ pub fn run(folder: &Folder, scale: Scale) -> Result<(), Failure> {
     };
     let film = setup.film(&motion)?;
     let mut text = format!(
-        "Ramp from 100 to 1000 Hz in {:.2} s, 0.5 px, {}x1048 at 120 fps, gaps filled, below 1000 Hz, seed {}; \
+        "Ramp from 100 to 1000 Hz in {:.2} s, 0.5 px, {}x1048 at 120 fps, gaps filled, below 1000 Hz, seed {}{}; \
          strongest frequency of windows of {WINDOW_S} s\n\n\
          | method | SNR, dB | windows off by more than {WRONG_HZ} Hz | rms error of the others, Hz |\n| --- | --: | --: | --: |\n",
-        ramp.duration_s, scale.sound_cols, scale.seed
+        ramp.duration_s,
+        scale.sound_cols,
+        scale.seed,
+        scale.of_what()
     );
     let mut panels = Vec::new();
     for (name, heard) in all(&film, "chirp") {
@@ -103,13 +106,12 @@ pub(super) fn all(film: &Film, what: &str) -> Vec<(&'static str, Sound)> {
         "true rows, gaps filled",
         hear(film, &film.recording.truth_px),
     )];
-    for method in film.methods() {
-        working_on(&format!("{what}: {}", method.name()));
-        heard.push((
-            method.name(),
-            hear(film, &method.shifts(&film.recording.clip)),
-        ));
-    }
+    let measured = film.measured(what);
+    heard.extend(
+        measured
+            .into_iter()
+            .map(|(name, shifts)| (name, hear(film, &shifts))),
+    );
     heard
 }
 

@@ -10,7 +10,7 @@ use super::film::Setup;
 use crate::failure::Failure;
 use crate::figure::lines::{Curve, Lines};
 use crate::linear::median;
-use crate::methods::thesis::Thesis;
+use crate::methods::thesis::{Reference, Thesis};
 use crate::methods::visual::{By, VisualMicrophone};
 use crate::methods::{Clip, Method, Shifts};
 use crate::sim::{Motion, Step};
@@ -22,7 +22,7 @@ const PLACES: [f64; 12] = [
 
 /// Each row's shift against the first frame, by one sub-band of the shearlet each.
 fn shearlet(clip: &Clip, thesis: &Thesis) -> Vec<Shifts> {
-    thesis.by_band(clip, |phases| phases[0].clone())
+    thesis.by_band(clip, Reference::First)
 }
 
 /// Median over all rows (and sub-bands) of each frame against the first, and the share within half a pixel of the truth.

@@ -2,13 +2,14 @@
 
 use rowtone::camera::Timing;
 
+use super::working_on;
 use crate::failure::Failure;
-use crate::methods::Method;
 use crate::methods::core::Core;
 use crate::methods::study::{Recording, record};
 use crate::methods::thesis::Thesis;
 use crate::methods::visual::{By, VisualMicrophone};
-use crate::sim::{Config, Motion, Preset, Scene, Sensor};
+use crate::methods::{Method, Shifts};
+use crate::sim::{Config, Motion, Optics, Preset, Scene, Sensor};
 
 /// A camera and what it looks at.
 #[derive(Clone, Debug)]
@@ -19,6 +20,8 @@ pub struct Setup {
     pub frames: u32,
     /// What it looks at.
     pub scene: Scene,
+    /// Up to where the lens passes details ([`Optics::blur_for_cutoff`]), cycles/px.
+    pub cutoff_cycles_per_px: f64,
     /// Same seed, same recording.
     pub seed: u64,
 }
@@ -33,8 +36,19 @@ impl Setup {
             sensor,
             frames,
             scene: Scene::Speckle { grain_px: 2.0 },
+            cutoff_cycles_per_px: 0.1,
             seed,
         }
+    }
+
+    /// Details down to the pixels, where `sharp` is wanted: the finest sub-bands then hold more than noise.
+    #[must_use]
+    pub fn sharp(mut self, sharp: bool) -> Self {
+        if sharp {
+            self.scene = Scene::Speckle { grain_px: 0.7 };
+            self.cutoff_cycles_per_px = 0.25;
+        }
+        self
     }
 
     /// Films a motion.
@@ -42,7 +56,7 @@ impl Setup {
     /// # Errors
     /// [`Failure::Usage`] for what cannot be simulated.
     pub fn film(&self, motion: &Motion) -> Result<Film, Failure> {
-        let config = Config {
+        let mut config = Config {
             seed: self.seed,
             sensor: self.sensor.clone(),
             frames: self.frames,
@@ -50,6 +64,7 @@ impl Setup {
             motion: motion.clone(),
             ..Config::default()
         };
+        config.optics.blur_px = Optics::blur_for_cutoff(self.cutoff_cycles_per_px);
         let sensor = &self.sensor;
         let timing = Timing::new(sensor.line_time_ps, sensor.exposure_ns, sensor.rows as u16)
             .map_err(|e| Failure::usage(e.to_string()))?;
@@ -88,5 +103,15 @@ impl Film {
             Box::new(Thesis::coarse()),
             Box::new(VisualMicrophone { by: By::Row }),
         ]
+    }
+
+    /// What each of [`Self::methods`] makes of it, with its name.
+    pub fn measured(&self, what: &str) -> Vec<(&'static str, Shifts)> {
+        let methods = self.methods();
+        let measured = methods.iter().map(|method| {
+            working_on(&format!("{what}: {}", method.name()));
+            (method.name(), method.shifts(&self.recording.clip))
+        });
+        measured.collect()
     }
 }

@@ -39,6 +39,8 @@ pub struct Scale {
     pub sound_frames: u32,
     /// Which recordings these are.
     pub seed: u64,
+    /// Fine specks before a sharp lens instead of the usual ones.
+    pub sharp: bool,
 }
 
 impl Scale {
@@ -48,6 +50,7 @@ impl Scale {
         sound_cols: 64,
         sound_frames: 240,
         seed: 1,
+        sharp: false,
     };
     /// A look at it: a minute.
     pub const QUICK: Self = Self {
@@ -55,7 +58,19 @@ impl Scale {
         sound_cols: 48,
         sound_frames: 40,
         seed: 1,
+        sharp: false,
     };
+}
+
+impl Scale {
+    /// What a table says of the scene where it is not the usual one.
+    fn of_what(self) -> &'static str {
+        if self.sharp {
+            ", specks of 0.7 px before a lens that passes 0.25 cycles/px"
+        } else {
+            ""
+        }
+    }
 }
 
 /// Where results go.

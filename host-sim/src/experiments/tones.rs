@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use super::film::Setup;
-use super::{Folder, Scale, working_on};
+use super::{Folder, Scale};
 use crate::failure::Failure;
 use crate::figure::lines::{Curve, Lines};
 use crate::methods::remove_row_means;
@@ -31,8 +31,7 @@ pub struct Found {
 pub fn measure(
     hz: f64,
     amplitude_px: f64,
-    cols: u32,
-    seed: u64,
+    setup: &Setup,
 ) -> Result<Vec<(&'static str, Option<Found>)>, Failure> {
     let tone = Tone {
         hz,
@@ -43,12 +42,11 @@ pub fn measure(
         tones: vec![tone],
         ..Motion::default()
     };
-    let film = Setup::thesis(cols, 6, seed).film(&motion)?;
+    let film = setup.film(&motion)?;
     Ok(film
-        .methods()
-        .iter()
-        .map(|method| {
-            let mut shifts = method.shifts(&film.recording.clip);
+        .measured(&format!("{hz} Hz"))
+        .into_iter()
+        .map(|(name, mut shifts)| {
             remove_row_means(&mut shifts);
             let fit = Fit::new(&film.recording, &shifts);
             let found = fit.strongest(&shifts, BAND_HZ).map(|hz| Found {
@@ -58,7 +56,7 @@ pub fn measure(
                     c.hypot(s) / amplitude_px
                 },
             });
-            (method.name(), found)
+            (name, found)
         })
         .collect())
 }
@@ -69,16 +67,18 @@ pub fn measure(
 /// [`Failure`] for what cannot be simulated or written.
 pub fn run(folder: &Folder, scale: Scale, amplitude_px: f64) -> Result<(), Failure> {
     let cols = scale.tone_cols;
+    let setup = Setup::thesis(cols, 6, 1).sharp(scale.sharp);
     let mut text = format!(
         "Error of the strongest frequency between {} and {} Hz, Hz, and amplitude over the true one; {amplitude_px} px, \
-         six frames of {cols}x1048 at 120 fps, seed 1\n\n| Hz |",
-        BAND_HZ.0, BAND_HZ.1
+         six frames of {cols}x1048 at 120 fps, seed 1{}\n\n| Hz |",
+        BAND_HZ.0,
+        BAND_HZ.1,
+        scale.of_what()
     );
     let mut curves: Vec<Curve> = Vec::new();
     for k in 0..=10 {
         let hz = 75.0 + 25.0 * f64::from(k);
-        working_on(&format!("tones: {hz} Hz"));
-        let line = measure(hz, amplitude_px, cols, 1)?;
+        let line = measure(hz, amplitude_px, &setup)?;
         // Writing to a string cannot fail.
         if k == 0 {
             line.iter().for_each(|(name, _)| {
@@ -125,7 +125,7 @@ mod tests {
     /// The thesis's hardest tone for it, close to a multiple of the frame rate, in a narrow picture.
     #[test]
     fn a_tone_near_the_frame_rate_is_found_in_six_frames() {
-        let found = measure(125.0, 0.5, 48, 3).unwrap();
+        let found = measure(125.0, 0.5, &Setup::thesis(48, 6, 3)).unwrap();
         let (name, ours) = found[0];
         assert_eq!((name, found.len()), ("rowtone", 4));
         let ours = ours.unwrap();

@@ -81,10 +81,13 @@ pub(super) const HEAD: &str = "SNR = 10·log10(Σ I² / Σ (Î − I)²) and mea
 /// # Errors
 /// [`Failure`] for what cannot be simulated or written.
 pub fn run(folder: &Folder, scale: Scale) -> Result<(), Failure> {
-    let setup = Setup::thesis(scale.sound_cols, scale.sound_frames, scale.seed);
+    let setup = Setup::thesis(scale.sound_cols, scale.sound_frames, scale.seed).sharp(scale.sharp);
     let mut text = format!(
-        "0.5 px at the loudest, {}x1048 at 120 fps, {} frames, seed {}. {HEAD}",
-        scale.sound_cols, scale.sound_frames, scale.seed
+        "0.5 px at the loudest, {}x1048 at 120 fps, {} frames, seed {}{}. {HEAD}",
+        scale.sound_cols,
+        scale.sound_frames,
+        scale.seed,
+        scale.of_what()
     );
     let music = heard(folder, &setup, &sounds::music(), "music", &mut text)?;
     let speech = heard(folder, &setup, &sounds::speech(), "speech", &mut text)?;

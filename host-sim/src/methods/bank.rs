@@ -10,6 +10,8 @@ use super::fourier::{C, Plane};
 pub struct Bank {
     plane: Plane,
     windows: Vec<Vec<f64>>,
+    /// Columns in which a window is not zero.
+    columns: Vec<Vec<usize>>,
     rests: Vec<Vec<f64>>,
 }
 
@@ -49,9 +51,18 @@ impl Bank {
                 .zip(&power)
                 .for_each(|(w, p)| *w /= p.sqrt());
         }
+        let width = plane.width;
+        let columns = windows
+            .iter()
+            .map(|window| {
+                let used = |&x: &usize| window.iter().skip(x).step_by(width).any(|v| *v != 0.0);
+                (0..width).filter(used).collect()
+            })
+            .collect();
         Self {
             plane,
             windows,
+            columns,
             rests,
         }
     }
@@ -73,7 +84,8 @@ impl Bank {
 
     /// Complex coefficients of one window, one a pixel.
     pub fn band(&self, spectrum: &[C], band: usize) -> Vec<C> {
-        self.plane.inverse(times(spectrum, &self.windows[band]))
+        self.plane
+            .inverse_within(spectrum, &self.windows[band], &self.columns[band])
     }
 
     /// Coefficients of all windows and rests.

@@ -2,7 +2,7 @@
 //!
 //! 1. Every frame is split by [`super::shearlet`]; of each sub-band of the horizontal cone only the phase is kept.
 //! 2. Algorithm 1: the reference phase is the mean phase of all frames (of unit vectors, as phases wrap).
-//! 3. Each row's phase is correlated with the reference's row; the peak is interpolated after Foroosh.
+//! 3. Each row's phase is correlated with the reference's row ([`Reading`]); the peak is interpolated after Foroosh.
 //! 4. Algorithm 2: the signals of all sub-bands are shifted to where their inner product with the strongest one is
 //!    largest, and averaged.
 //!
@@ -16,6 +16,9 @@ use crate::linear::dot;
 
 /// Furthest that one sub-band is shifted against another, rows.
 const FURTHEST: isize = 8;
+
+/// From so many columns on a row of coarse phases has jumps enough for its angles to be correlated.
+const WIDE_COLS: usize = 128;
 
 /// The thesis's method.
 #[derive(Clone, Debug)]
@@ -56,29 +59,69 @@ impl Method for Thesis {
     }
 
     fn shifts(&self, clip: &Clip) -> Shifts {
-        align_and_sum(self.by_band(clip, reference_phase))
+        align_and_sum(self.by_band(clip, Reference::Mean))
     }
 }
 
+/// What the rows of phases are correlated with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reference {
+    /// The mean phase of all frames (Algorithm 1).
+    Mean,
+    /// The first frame's phase.
+    First,
+}
+
 impl Thesis {
-    /// Each row's shift in every frame, by one sub-band that is used each, against what `reference` makes of all frames'
-    /// phases.
-    pub fn by_band(&self, clip: &Clip, reference: impl Fn(&[Vec<C>]) -> Vec<C>) -> Vec<Shifts> {
+    /// Each row's shift in every frame, by one sub-band that is used each.
+    ///
+    /// Frames are split anew for the mean and for the shifts: all coefficients of a long recording have no room.
+    pub fn by_band(&self, clip: &Clip, reference: Reference) -> Vec<Shifts> {
         let pyramid = Pyramid::new(clip.width, clip.height, &self.directions);
-        let spectra: Vec<Vec<C>> = clip
-            .frames
-            .iter()
-            .map(|f| pyramid.bank.spectrum(f))
+        let used: Vec<usize> = self.used(&pyramid).collect();
+        let split = |frame: &Vec<f64>| {
+            let spectrum = pyramid.bank.spectrum(frame);
+            let bands = used.iter().map(|&band| pyramid.bank.band(&spectrum, band));
+            bands.collect::<Vec<_>>()
+        };
+        let mut means = vec![MeanPhase::default(); used.len()];
+        let count = match reference {
+            Reference::Mean => clip.frames.len(),
+            Reference::First => 1,
+        };
+        for frame in clip.frames.iter().take(count) {
+            let bands = split(frame);
+            means.iter_mut().zip(&bands).for_each(|(m, b)| m.add(b));
+        }
+        let correlation = PhaseCorrelation::new(clip.width);
+        let reading = self.reading(clip.width);
+        let references: Vec<Vec<Vec<C>>> = means
+            .into_iter()
+            .map(|mean| phase_rows(&correlation, &mean.0, clip.width, reading))
             .collect();
-        self.used(&pyramid)
-            .map(|band| {
-                let phases: Vec<Vec<C>> = spectra
-                    .iter()
-                    .map(|s| unit(pyramid.bank.band(s, band)))
-                    .collect();
-                correlate_rows(&phases, &reference(&phases), clip.width)
-            })
-            .collect()
+        let mut shifts = vec![Shifts::new(); used.len()];
+        for frame in &clip.frames {
+            for ((band, reference), shifts) in split(frame).iter().zip(&references).zip(&mut shifts)
+            {
+                let rows = phase_rows(&correlation, band, clip.width, reading);
+                let pairs = rows.iter().zip(reference);
+                shifts.push(
+                    pairs
+                        .map(|(row, home)| correlation.shift(row, home, PeakFit::Foroosh))
+                        .collect(),
+                );
+            }
+        }
+        shifts
+    }
+
+    /// The reading that does better (docs/results.md): angles for coarse sub-bands of a picture that is wide enough.
+    fn reading(&self, width: usize) -> Reading {
+        if self.scales.start > 0 && width >= WIDE_COLS {
+            Reading::Angles
+        } else {
+            Reading::UnitVectors
+        }
     }
 
     /// Sub-bands of the horizontal cone in the scales that are used.
@@ -90,50 +133,57 @@ impl Thesis {
     }
 }
 
-/// Only the phase, as unit vectors.
-fn unit(coefficients: Vec<C>) -> Vec<C> {
-    coefficients
-        .into_iter()
-        .map(|c| {
+/// Algorithm 1: the mean phase of all frames, as a sum of unit vectors, for phases wrap.
+#[derive(Clone, Debug, Default)]
+struct MeanPhase(Vec<C>);
+
+impl MeanPhase {
+    fn add(&mut self, coefficients: &[C]) {
+        self.0.resize(coefficients.len(), C::new(0.0, 0.0));
+        for (sum, c) in self.0.iter_mut().zip(coefficients) {
             let size = c.norm();
             if size > 0.0 {
-                c / size
-            } else {
-                C::new(1.0, 0.0)
+                *sum += c / size;
             }
-        })
-        .collect()
-}
-
-/// Algorithm 1: the mean phase of all frames.
-fn reference_phase(phases: &[Vec<C>]) -> Vec<C> {
-    let mut sum = vec![C::new(0.0, 0.0); phases.first().map_or(0, Vec::len)];
-    for frame in phases {
-        sum.iter_mut().zip(frame).for_each(|(r, p)| *r += p);
+        }
     }
-    unit(sum)
 }
 
-/// Shift of every row of phases against the reference's, px.
-fn correlate_rows(phases: &[Vec<C>], reference: &[C], width: usize) -> Shifts {
-    let correlation = PhaseCorrelation::new(width);
-    let rows = |frame: &[C]| -> Vec<Vec<C>> {
-        frame
-            .chunks_exact(width)
-            .map(|r| correlation.spectrum(r))
-            .collect()
-    };
-    let references = rows(reference);
-    phases
-        .iter()
-        .map(|frame| {
-            rows(frame)
-                .iter()
-                .zip(&references)
-                .map(|(row, reference)| correlation.shift(row, reference, PeakFit::Foroosh))
-                .collect()
-        })
-        .collect()
+/// What a row of a phase picture is made of. The thesis's words fit both.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reading {
+    /// Angles, −π to π. Their jumps move with the picture and fill the spectrum, so that peaks are sharp; where a row has
+    /// too few of them, or holds noise, peaks are taken far away.
+    Angles,
+    /// Unit vectors. They fill one side of the spectrum only, for which Foroosh's formula was not made, and their peaks are
+    /// blunt; but few are taken far away.
+    UnitVectors,
+}
+
+impl Reading {
+    fn value(self, coefficient: C) -> C {
+        let size = coefficient.norm();
+        match self {
+            Self::Angles => C::new(coefficient.arg(), 0.0),
+            Self::UnitVectors if size > 0.0 => coefficient / size,
+            Self::UnitVectors => C::new(1.0, 0.0),
+        }
+    }
+}
+
+/// Spectrum of every row of a phase picture.
+fn phase_rows(
+    correlation: &PhaseCorrelation,
+    coefficients: &[C],
+    width: usize,
+    reading: Reading,
+) -> Vec<Vec<C>> {
+    let rows = coefficients.chunks_exact(width);
+    rows.map(|row| {
+        let phases: Vec<C> = row.iter().map(|&c| reading.value(c)).collect();
+        correlation.spectrum(&phases)
+    })
+    .collect()
 }
 
 /// Algorithm 2: all signals moved to their largest inner product with the strongest, and averaged.
@@ -227,30 +277,67 @@ mod tests {
             .collect();
         let pyramid = Pyramid::new(width, height, &DIRECTIONS);
         let [home, moved] = [picture, moved].map(|p| pyramid.bank.spectrum(&p));
+        let correlation = PhaseCorrelation::new(width);
         let used: Vec<usize> = Thesis::default().used(&pyramid).collect();
         assert_eq!(used.len(), 16);
-        for band in used {
-            let [home, moved] = [&home, &moved].map(|s| unit(pyramid.bank.band(s, band)));
-            let shifts = correlate_rows(&[moved], &home, width);
+        for (band, reading) in used
+            .iter()
+            .flat_map(|&b| [(b, Reading::Angles), (b, Reading::UnitVectors)])
+        {
+            let [home, moved] = [&home, &moved]
+                .map(|s| phase_rows(&correlation, &pyramid.bank.band(s, band), width, reading));
+            let shifts: Vec<f64> = moved
+                .iter()
+                .zip(&home)
+                .map(|(m, h)| correlation.shift(m, h, PeakFit::Foroosh))
+                .collect();
             // Coarse rows' phases are so smooth that some frequencies hold nothing but rounding.
-            for (y, shift) in shifts[0].iter().enumerate() {
+            for (y, shift) in shifts.iter().enumerate() {
                 assert!(
                     (shift - by as f64).abs() < 0.3,
-                    "band {band}, row {y}: {shift}"
+                    "band {band}, {reading:?}, row {y}: {shift}"
                 );
             }
-            let mean = shifts[0].iter().sum::<f64>() / height as f64;
-            assert!((mean - by as f64).abs() < 0.03, "band {band}: {mean}");
+            let mean = shifts.iter().sum::<f64>() / height as f64;
+            assert!(
+                (mean - by as f64).abs() < 0.03,
+                "band {band}, {reading:?}: {mean}"
+            );
         }
+    }
+
+    /// Behind a lens the finest sub-bands hold noise alone. In six frames the reference holds a good part of each frame's own
+    /// noise, which keeps peaks at home; in many frames it does not, and they lie anywhere in the row.
+    #[test]
+    fn the_finest_sub_bands_are_lost_in_long_recordings() {
+        use crate::methods::study::record;
+        let far = |frames, scales| {
+            let mut config = crate::sim::Config::default();
+            (config.sensor.cols, config.sensor.rows, config.frames) = (128, 16, frames);
+            let clip = record(config).unwrap().clip;
+            let thesis = Thesis {
+                scales,
+                ..Thesis::default()
+            };
+            let shifts = thesis.by_band(&clip, Reference::Mean);
+            let all = shifts.iter().flatten().flatten();
+            let far = all.clone().filter(|v| v.abs() > 2.0).count();
+            far as f64 / all.count() as f64
+        };
+        let (few, many) = (far(6, 0..1), far(60, 0..1));
+        assert!(many > 0.4 && few < 0.5 * many, "{few} {many}");
+        let coarse = far(60, 2..4);
+        assert!(coarse < 0.05, "{coarse}");
     }
 
     /// Algorithm 1: phases wrap, so their mean is that of unit vectors.
     #[test]
     fn the_reference_is_the_mean_around_the_circle() {
-        let turned = |a: f64| vec![C::from_polar(1.0, a)];
-        let mean = reference_phase(&[turned(3.1), turned(-3.1), turned(3.1), turned(-3.1)]);
-        assert!((mean[0].arg().abs() - std::f64::consts::PI).abs() < 1e-9);
-        assert!(reference_phase(&[]).is_empty());
+        let mut mean = MeanPhase::default();
+        for (size, angle) in [(1.0, 3.1), (5.0, -3.1), (2.0, 3.1), (0.1, -3.1), (0.0, 0.0)] {
+            mean.add(&[C::from_polar(size, angle)]);
+        }
+        assert!((mean.0[0].arg().abs() - std::f64::consts::PI).abs() < 1e-9);
     }
 
     /// A tone of half a pixel through the simulated camera.

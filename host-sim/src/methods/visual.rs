@@ -35,14 +35,9 @@ impl Method for VisualMicrophone {
 
     fn shifts(&self, clip: &Clip) -> Shifts {
         let pyramid = Pyramid::new(clip.width, clip.height, SCALES, ORIENTATIONS);
-        let spectra: Vec<Vec<C>> = clip
-            .frames
-            .iter()
-            .map(|f| pyramid.bank.spectrum(f))
-            .collect();
-        if spectra.is_empty() {
+        let Some(first) = clip.frames.first().map(|f| pyramid.bank.spectrum(f)) else {
             return Vec::new();
-        }
+        };
         let length = match self.by {
             By::Row => clip.width,
             By::Frame => clip.width * clip.height,
@@ -51,16 +46,23 @@ impl Method for VisualMicrophone {
         let bands: Vec<usize> = (0..pyramid.bands.len())
             .filter(|&band| pyramid.bands[band].angle == 0.0)
             .collect();
-        let mut shifts = align_and_sum(
-            bands
-                .iter()
-                .map(|&band| phases(&pyramid, &spectra, band, length))
-                .collect(),
-        );
+        let references: Vec<Vec<C>> = bands
+            .iter()
+            .map(|&band| pyramid.bank.band(&first, band))
+            .collect();
+        let mut signals = vec![Shifts::new(); bands.len()];
+        for frame in &clip.frames {
+            let spectrum = pyramid.bank.spectrum(frame);
+            for ((&band, reference), signal) in bands.iter().zip(&references).zip(&mut signals) {
+                let here = pyramid.bank.band(&spectrum, band);
+                signal.push(phases(&here, reference, length));
+            }
+        }
+        let mut shifts = align_and_sum(signals);
         // The sum is an average over the sub-bands; so is what a pixel would make of it.
         let mut turn = vec![f64::MIN_POSITIVE; clip.width * clip.height / length.max(1)];
         for &band in &bands {
-            let of_band = turns(&pyramid, &spectra[0], band, length);
+            let of_band = turns(&pyramid, &first, band, length);
             turn.iter_mut()
                 .zip(of_band)
                 .for_each(|(t, b)| *t += b / bands.len() as f64);
@@ -76,25 +78,18 @@ impl Method for VisualMicrophone {
 }
 
 /// Sum of the phase against the first frame, weighted by squared amplitude, of every `length` coefficients.
-fn phases(pyramid: &Pyramid, spectra: &[Vec<C>], band: usize, length: usize) -> Shifts {
-    let reference = pyramid.bank.band(&spectra[0], band);
+fn phases(here: &[C], reference: &[C], length: usize) -> Vec<f64> {
     let against = |here: &[C], reference: &[C]| -> f64 {
         let pairs = here.iter().zip(reference);
         pairs
             .map(|(c, r)| c.norm_sqr() * (c * r.conj()).arg())
             .sum()
     };
-    spectra
-        .iter()
-        .map(|spectrum| {
-            let here = pyramid.bank.band(spectrum, band);
-            let rows = here
-                .chunks_exact(length)
-                .zip(reference.chunks_exact(length));
-            // A shift to the right turns phases back.
-            rows.map(|(here, reference)| -against(here, reference))
-                .collect()
-        })
+    let rows = here
+        .chunks_exact(length)
+        .zip(reference.chunks_exact(length));
+    // A shift to the right turns phases back.
+    rows.map(|(here, reference)| -against(here, reference))
         .collect()
 }
 
