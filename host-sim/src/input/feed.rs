@@ -16,7 +16,7 @@ use crate::ring::{Inlet, Next as Arrival, Outlet, ring};
 
 /// Frames of a file ahead of the lines, bytes of luma: enough for the millisecond or two in which the reading thread's
 /// processor computes a report.
-const AHEAD_BYTES: usize = 16 << 20;
+const AHEAD_BYTES: usize = 15 << 20;
 /// But so many frames, of a pipe no more.
 const LEAST_AHEAD: usize = 3;
 /// Blocks of frames ahead of the lines: handing one over costs some 10 µs. Whoever reads a pipe may be waiting for each
