@@ -3,13 +3,13 @@
 
 mod common;
 
-use common::{HZ, PX, assert_the_tone, command, config, file, on_clip, reports, texts, y4m};
-use host_sim::sim::{Config, Flicker, Hand, Rect, Scene, Step, Tone};
+use common::{HZ, PX, assert_the_tone, command, config, file, on_clip, reports, texts};
+use host_sim::sim::{Camera, Config, Flicker, Hand, PixelBuffer, Rect, Scene, Step, Tone, y4m};
 use serde_json::Value;
 
 /// The reports on a recording.
 fn analyzed(name: &str, config: Config, more: &[&str]) -> Vec<Value> {
-    let clip = file(&format!("fooled-{name}.y4m"), &y4m(config));
+    let clip = file(&format!("fooled-{name}.y4m"), &common::y4m(config));
     let args = [&["--format", "json"], more].concat();
     let output = on_clip("analyze", &clip, &args);
     let (stdout, stderr) = texts(&output);
@@ -42,6 +42,43 @@ fn a_flickering_lamp_is_no_vibration() {
         let reports = analyzed(&format!("flicker-{hz}"), lamp, &[]);
         assert_eq!(reports.len(), 1);
         assert_the_tone(&reports[0]);
+    }
+}
+
+/// Rows of an even wall in the middle of a picture: under a lamp the light below them is another than above.
+#[test]
+fn rows_without_texture_under_a_flickering_lamp_mislead_none_below() {
+    for phase in 10..16u8 {
+        let mut lamp = config(77);
+        (lamp.sensor.cols, lamp.sensor.rows) = (256, 240);
+        lamp.sensor.fps = 38.46;
+        lamp.seed = u64::from(phase);
+        (lamp.sensor.full_well_e, lamp.sensor.read_noise_e) = (4000.0, 60.0);
+        lamp.optics.bright = 0.7;
+        lamp.light.flicker = Some(Flicker {
+            depth: 0.3,
+            hz: 100.3,
+            phase_rad: 0.8 * f64::from(phase),
+        });
+        let mut wall = lamp.clone();
+        wall.scene = Scene::Plain;
+        let row = lamp.sensor.cols as usize;
+        let flat = 80 * row..120 * row;
+        let (lamp, wall) = (Camera::new(lamp), Camera::new(wall));
+        let (lamp, wall) = (lamp.expect("a camera"), wall.expect("a camera"));
+        let mut clip = Vec::new();
+        y4m::write_header(&mut clip, &lamp.config().sensor).expect("to memory");
+        for (mut frame, wall) in lamp.frames().zip(wall.frames()) {
+            if let (PixelBuffer::U8(pixels), PixelBuffer::U8(wall)) =
+                (&mut frame.pixels, &wall.pixels)
+            {
+                pixels[flat.clone()].copy_from_slice(&wall[flat.clone()]);
+            }
+            y4m::write_frame(&mut clip, &frame).expect("to memory");
+        }
+        let clip = file(&format!("fooled-wall-{phase}.y4m"), &clip);
+        let output = on_clip("analyze", &clip, &["--format", "json"]);
+        reports(&texts(&output).0).iter().for_each(assert_the_tone);
     }
 }
 
@@ -151,7 +188,7 @@ fn a_shaking_tripod_is_told_from_the_machine() {
     };
     shaking.motion.tones.push(tone(183.4, 0.05, 0.4));
     shaking.shake.tones.push(tone(31.2, 0.3, 0.0));
-    let clip = file("fooled-tripod.y4m", &y4m(shaking));
+    let clip = file("fooled-tripod.y4m", &common::y4m(shaking));
     let path = clip.to_str().expect("a plain path");
     let analyzed = |more: &[&str]| {
         let plain = [
@@ -198,7 +235,7 @@ fn a_part_that_vibrates_by_less_than_a_row_can_tell_is_found() {
         amplitude_px: 0.02,
         phase_rad: 0.4,
     });
-    let clip = file("fooled-part.y4m", &y4m(config));
+    let clip = file("fooled-part.y4m", &common::y4m(config));
     let path = clip.to_str().expect("a plain path");
     let analyzed = |roi: &str| {
         let camera = ["--line-time-us", "40", "--exposure-us", "500"];
@@ -234,7 +271,7 @@ fn a_sky_over_a_swift_picture_is_no_disturbance() {
         amplitude_px: 4.0,
         phase_rad: 0.4,
     });
-    let clip = file("fooled-sky.y4m", &y4m(config));
+    let clip = file("fooled-sky.y4m", &common::y4m(config));
     let path = clip.to_str().expect("a plain path");
     let camera = ["--line-time-us", "33.67", "--exposure-us", "200"];
     let args = [&["analyze", path, "--format", "json"], &camera[..]];

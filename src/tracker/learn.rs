@@ -232,7 +232,7 @@ impl Tracker<'_> {
         }
     }
 
-    fn settle_noise(&mut self) {
+    pub(super) fn settle_noise(&mut self) {
         if let Some(noise) = self.meter.noise(self.recipe.saturation) {
             self.recipe.noise = noise;
         }

@@ -220,6 +220,9 @@ impl Tracker<'_> {
         } else if self.frame.is_some() && self.frames_in_stage >= self.config.learn_frames {
             self.end_round();
         }
+        if self.stage == Stage::Rough && self.frames_in_stage.is_power_of_two() {
+            self.settle_noise();
+        }
         self.frames_in_stage = self.frames_in_stage.saturating_add(1);
         self.frame = Some(frame);
         self.turn = self.turn_of(frame);
@@ -243,6 +246,7 @@ impl Tracker<'_> {
             return Err(Left::NoTexture);
         };
         if !table.has_texture() {
+            self.note_light(row, &table, pixels);
             return Err(Left::NoTexture);
         }
         let information_per_px2 = table.information_per_px2();
@@ -287,6 +291,19 @@ impl Tracker<'_> {
             shift_px,
             information_per_px2,
         })
+    }
+
+    /// A row without texture tells of the light too, where it is neither dark nor near to being clipped.
+    fn note_light<R: Row>(&mut self, row: usize, table: &RowTable, pixels: &R) {
+        let mean = table.pixel_sum() / f32::from(self.config.width);
+        let (dark, bright) = (self.recipe.saturation / 16.0, self.recipe.saturation * 0.6);
+        if !(dark..bright).contains(&mean) {
+            return;
+        }
+        if let Some((_, sum)) = self.sums(row, pixels) {
+            let before = core::mem::replace(&mut self.to_reference, table.factor_to_reference(sum));
+            self.flicker.add(before, self.to_reference);
+        }
     }
 
     /// What becomes of a line that is looked at; its shift, unless it is disturbed.
