@@ -86,7 +86,25 @@ impl Averaging {
     /// Averages the columns of `span` in; the line was kept by [`Pixel::pack`].
     pub(crate) fn some<P: Pixel>(&self, span: Range<usize>, mean: &mut [u16], line: &[f32]) {
         let v = |x: usize| f32::from(P::unpack(line, x));
-        for x in span.start.max(self.from)..span.end.min(self.to) {
+        let span = span.start.max(self.from)..span.end.min(self.to);
+        if let (Some((first, weights)), 1) = (self.taps, self.stride) {
+            // Seven of a column's pixels are those of the column before.
+            let at = span.start.wrapping_add_signed(first);
+            let at = at.wrapping_sub(1);
+            let [_, mut a, mut b, mut c, mut d, mut e, mut f, mut g]: [f32; TAPS] =
+                core::array::from_fn(|k| v(at.wrapping_add(k)));
+            let Some(mean) = mean.get_mut(span) else {
+                return;
+            };
+            for (x, m) in mean.iter_mut().enumerate() {
+                let h = v(at.wrapping_add(x + TAPS));
+                let pixels = [a, b, c, d, e, f, g, h].into_iter();
+                self.mix(m, pixels.zip(weights).map(|(v, weight)| weight * v).sum());
+                (a, b, c, d, e, f, g) = (b, c, d, e, f, g, h);
+            }
+            return;
+        }
+        for x in span {
             let Some(m) = mean.get_mut(x) else { return };
             let value = match self.taps {
                 None => v(x),

@@ -6,8 +6,10 @@ use crate::kernel::Kernel;
 pub(crate) trait Pixel: Copy {
     /// Its value.
     fn value(self) -> u16;
-    /// Σ h·p and Σ p of a line, of at most 8192 pixels.
-    fn sums(kernel: Kernel, pixels: &[Self], coefficients: &[i8]) -> (f32, f32);
+    /// Σ h·p and Σ p of a line, of at most 8192 pixels, with the whole row of coefficients that is kept.
+    fn sums(kernel: Kernel, pixels: &[Self], row: &[i8]) -> (f32, f32);
+    /// The same of a part, and as many columns of the row from `from` on.
+    fn part_sums(kernel: Kernel, pixels: &[Self], row: &[i8], from: usize) -> (f32, f32);
     /// Keeps a line for later in a scratch of f32, of which only the bits are used: one for two pixels is
     /// enough.
     fn pack(pixels: &[Self], to: &mut [f32]);
@@ -21,10 +23,14 @@ impl Pixel for u8 {
         u16::from(self)
     }
     #[inline(always)]
-    fn sums(kernel: Kernel, pixels: &[Self], coefficients: &[i8]) -> (f32, f32) {
-        let sums = kernel.sums_u8(pixels, coefficients);
-        // 64·255·8192 < 2³¹; converting 64 bits takes a microcontroller long.
-        (sums.product as i32 as f32, sums.pixels as u32 as f32)
+    fn sums(kernel: Kernel, pixels: &[Self], row: &[i8]) -> (f32, f32) {
+        let sums = kernel.kept_u8(pixels, row);
+        (sums.product as f32, sums.pixels as f32)
+    }
+    #[inline(always)]
+    fn part_sums(kernel: Kernel, pixels: &[Self], row: &[i8], from: usize) -> (f32, f32) {
+        let sums = kernel.kept_part_u8(pixels, row, from);
+        (sums.product as f32, sums.pixels as f32)
     }
     fn pack(pixels: &[Self], to: &mut [f32]) {
         let (fours, rest) = pixels.as_chunks::<4>();
@@ -50,8 +56,12 @@ impl Pixel for u16 {
         self
     }
     #[inline(always)]
-    fn sums(kernel: Kernel, pixels: &[Self], coefficients: &[i8]) -> (f32, f32) {
-        let sums = kernel.sums_u16(pixels, coefficients);
+    fn sums(kernel: Kernel, pixels: &[Self], row: &[i8]) -> (f32, f32) {
+        Self::part_sums(kernel, pixels, row, 0)
+    }
+    #[inline(always)]
+    fn part_sums(kernel: Kernel, pixels: &[Self], row: &[i8], from: usize) -> (f32, f32) {
+        let sums = kernel.kept_part_u16(pixels, row, from);
         (sums.product as f32, sums.pixels as f32)
     }
     fn pack(pixels: &[Self], to: &mut [f32]) {

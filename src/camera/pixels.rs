@@ -1,6 +1,6 @@
 //! The pixels of a line, as the kernels read them.
 
-use crate::kernel::{Kernel, Sums, spread::Spread};
+use crate::kernel::{Kernel, LineSums, spread::Spread};
 
 /// The pixels of a line as the kernels read them.
 ///
@@ -111,10 +111,10 @@ impl<'a> UpperBytes<'a> {
         })
     }
 
-    /// Σ h·p and Σ p with `coefficients`, one a pixel from the first on.
+    /// Σ h·p and Σ p with a row of coefficients that is kept, one a pixel from the first on.
     #[inline(always)]
-    pub(crate) fn sums(&self, kernel: Kernel, coefficients: &[i8]) -> Sums {
-        kernel.sums_spread(self.spread, self.bytes, coefficients)
+    pub(crate) fn sums(&self, kernel: Kernel, row: &[i8]) -> LineSums {
+        kernel.kept_spread(self.spread, self.bytes, row)
     }
 
     /// Brings the pixels together in `line`. `None` where that is shorter. Best is [`UpperBytes::SPARE`] more than

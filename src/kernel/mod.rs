@@ -3,6 +3,9 @@
 //! For pixels `p` and coefficients `h` of equal length each kernel returns Σ h·p and Σ p, exactly, so
 //! all of them give the same bits. The fastest one that the processor offers is chosen once, at start.
 //!
+//! A row's coefficients are made once and read with every line: [`Kernel::keep`] brings them into the form that a kernel
+//! likes best.
+//!
 //! |h| ≤ [`MAX_COEFFICIENT`], so that a pair of products u8 × i8 never leaves 16 bits.
 #![allow(unsafe_code)]
 
@@ -10,6 +13,8 @@
 mod aarch64;
 #[cfg(all(target_arch = "arm", any(target_feature = "dsp", rowtone_dsp)))]
 mod cortex_m;
+mod kept;
+mod pairs;
 mod portable;
 pub(crate) mod spread;
 mod sqrt;
@@ -18,6 +23,7 @@ mod x86_64;
 #[cfg(target_arch = "x86_64")]
 mod x86_64_avx512;
 
+pub use kept::LineSums;
 pub(crate) use sqrt::sqrtf;
 
 /// Largest magnitude of a coefficient: 2·64·255 < 2¹⁵.
@@ -194,6 +200,16 @@ impl Kernel {
         }
     }
 
+    /// Σ h·p alone, over 16-bit pixels.
+    #[inline]
+    pub(crate) fn product_u16(self, pixels: &[u16], coefficients: &[i8]) -> i64 {
+        match self.0 {
+            #[cfg(all(target_arch = "arm", any(target_feature = "dsp", rowtone_dsp)))]
+            Kind::CortexM => portable::product_u16(pixels, coefficients),
+            _ => self.sums_u16(pixels, coefficients).product,
+        }
+    }
+
     /// Sums over 16-bit pixels, as [`Kernel::sums_u8`].
     #[inline]
     pub fn sums_u16(self, pixels: &[u16], coefficients: &[i8]) -> Sums {
@@ -268,6 +284,7 @@ mod tests {
                     (&full_deep, &most),
                 ] {
                     assert_eq!(kernel.sums_u16(p, h), exact(p, h), "{kernel:?} {n}");
+                    assert_eq!(portable::product_u16(p, h), exact(p, h).product, "{n}");
                 }
             }
         }

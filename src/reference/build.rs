@@ -3,7 +3,7 @@
 //! A board must not spend a whole row's work in one line time, so the work is a small state machine:
 //! [`Build::advance`] does the next few columns of the present step. On a desktop one call does all.
 
-use super::{CUBICS, OFFSETS_PER_PX, QUADRATICS, RowTable};
+use super::{RowTable, Two, at_least_1};
 use crate::{
     align::UNKNOWN_STEPS,
     band::{HALFWAY, Level, MAX_HALF, SLOPE},
@@ -449,7 +449,7 @@ impl Build {
     /// A table without texture.
     fn blank(&self) -> RowTable {
         RowTable {
-            pixel_sum: self.total as f32 / self.recipe.counts_per_value,
+            pixel_sum: at_least_1(self.total as f32 / self.recipe.counts_per_value),
             ..RowTable::default()
         }
     }
@@ -512,10 +512,9 @@ impl Build {
             (0.0, 0.0)
         };
         table.px_per_product = 1.0 / slope;
-        table.offset = rounded(q[LAGS] / slope * OFFSETS_PER_PX);
-        table.quadratic = rounded(a * QUADRATICS);
-        table.cubic = rounded(b * CUBICS);
-        table.information = (information.to_bits() >> 16) as u16;
+        table.information_and_offset = Two::new(information, q[LAGS] / slope);
+        // A texture of single pixels has no more.
+        table.quadratic_and_cubic = Two::new(a.clamp(-2.0, 2.0), b.clamp(-4.0, 4.0));
         table
     }
 }
@@ -566,9 +565,5 @@ fn correlation(
     let (Some(mean), Some(coefficients)) = cut else {
         return 0.0;
     };
-    recipe.kernel.sums_u16(mean, coefficients).product as f32 / recipe.counts_per_value
-}
-
-fn rounded(v: f32) -> i16 {
-    libm::roundf(v).clamp(-32767.0, 32767.0) as i16
+    recipe.kernel.product_u16(mean, coefficients) as f32 / recipe.counts_per_value
 }

@@ -20,55 +20,77 @@ mod build;
 
 pub use build::{Build, Parts, Recipe};
 
-/// Units of [`RowTable`]'s small numbers: as fine as they may be for the largest that there are, 16 px of
-/// offset, and the 2 px⁻¹ and 4 px⁻² of a texture of single pixels.
-const OFFSETS_PER_PX: f32 = 2048.0;
-const QUADRATICS: f32 = 16384.0;
-const CUBICS: f32 = 8192.0;
-
 /// What the line path needs of a row besides its coefficients: 16 bytes.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct RowTable {
     /// 1/q', px per unit of Σ h·p at the reference's brightness.
     px_per_product: f32,
-    /// Σ r over the whole row.
+    /// Σ r over the whole row, at least 1 where the row was built.
     pixel_sum: f32,
-    /// Information, 1/px², as the upper half of an f32; 0 where the row has no texture.
-    information: u16,
-    /// Where the row's own reference reads, in [`OFFSETS_PER_PX`].
-    offset: i16,
-    /// In [`QUADRATICS`] of px⁻¹.
-    quadratic: i16,
-    /// In [`CUBICS`] of px⁻².
-    cubic: i16,
+    /// Information, 1/px², and where the row's own reference reads, px. All 0 where the row has no texture.
+    information_and_offset: Two,
+    /// The coefficients of u² in px⁻¹ and of u³ in px⁻².
+    quadratic_and_cubic: Two,
+}
+
+/// Two numbers of the precision of half an f32, 2⁻⁹. The first is the f32 itself, rounded so that the upper half of the
+/// second can stand in its lower half: a microcontroller reads it in one instruction, and the other in two more.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Two(u32);
+
+impl Two {
+    const ZERO: Self = Self(0);
+
+    /// What is not finite is 0.
+    fn new(first: f32, second: f32) -> Self {
+        let bits = |v: f32| if v.is_finite() { v.to_bits() } else { 0 };
+        let (first, second) = (bits(first), bits(second).saturating_add(0x8000) >> 16);
+        let magnitude = ((first & !(1 << 31)).saturating_sub(second) + 0x8000).min(0x7F7F_FFFF);
+        Self(first & (1 << 31) | magnitude & 0xFFFF_0000 | second)
+    }
+
+    #[inline(always)]
+    fn first(self) -> f32 {
+        f32::from_bits(self.0)
+    }
+
+    #[inline(always)]
+    fn second(self) -> f32 {
+        f32::from_bits(self.0 << 16)
+    }
 }
 
 impl RowTable {
-    /// Of a row that is not known yet.
+    /// Of a row that is not known yet: all zeros, as memory is at first.
     pub(crate) const EMPTY: Self = Self {
         px_per_product: 0.0,
         pixel_sum: 0.0,
-        information: 0,
-        offset: 0,
-        quadratic: 0,
-        cubic: 0,
+        information_and_offset: Two::ZERO,
+        quadratic_and_cubic: Two::ZERO,
     };
 
     /// What the row knows of its shift, 1/px²; 0 where it has too little texture to be measured.
     #[inline(always)]
     pub fn information_per_px2(&self) -> f32 {
-        f32::from_bits(u32::from(self.information) << 16)
+        self.information_and_offset.first()
+    }
+
+    /// The same row, which cannot be measured.
+    pub(crate) fn without_texture(&self) -> Self {
+        Self {
+            pixel_sum: self.pixel_sum,
+            ..Self::EMPTY
+        }
     }
 
     /// The row can be measured.
     #[inline]
     pub(crate) fn has_texture(&self) -> bool {
-        // No negative zero is ever stored.
-        self.information != 0
+        self.information_and_offset != Two::ZERO
     }
 
-    /// Σ r over the whole row, in pixel values.
+    /// Σ r over the whole row, in pixel values; at least 1 where the row was built.
     #[inline(always)]
     pub fn pixel_sum(&self) -> f32 {
         self.pixel_sum
@@ -78,16 +100,15 @@ impl RowTable {
     #[inline(always)]
     pub(crate) fn factor_to_reference(&self, pixel_sum: f32) -> f32 {
         // A black line has no brightness to divide by, and no texture to measure.
-        at_least_1(self.pixel_sum) / at_least_1(pixel_sum)
+        self.pixel_sum / at_least_1(pixel_sum)
     }
 
     /// The shift for `product` = Σ h·p/g of a line whose brightness is g times the reference's, px;
     /// right within ± 0.7 px or so.
     #[inline(always)]
     pub fn shift_px(&self, product: f32) -> f32 {
-        let offset_px = f32::from(self.offset) * (1.0 / OFFSETS_PER_PX);
         let (quadratic, cubic) = self.inverse();
-        let u = product * self.px_per_product - offset_px;
+        let u = product * self.px_per_product - self.information_and_offset.second();
         u * (1.0 + u * (quadratic + u * cubic))
     }
 
@@ -113,10 +134,8 @@ impl RowTable {
     /// The coefficients of u² in px⁻¹ and of u³ in px⁻².
     #[inline(always)]
     fn inverse(&self) -> (f32, f32) {
-        (
-            f32::from(self.quadratic) * (1.0 / QUADRATICS),
-            f32::from(self.cubic) * (1.0 / CUBICS),
-        )
+        let both = self.quadratic_and_cubic;
+        (both.first(), both.second())
     }
 }
 
@@ -124,6 +143,12 @@ impl RowTable {
 #[inline(always)]
 pub(crate) fn at_least_1(v: f32) -> f32 {
     if v > 1.0 { v } else { 1.0 }
+}
+
+impl Default for RowTable {
+    fn default() -> Self {
+        Self::EMPTY
+    }
 }
 
 #[cfg(test)]
@@ -193,6 +218,37 @@ mod tests {
         }
         assert!(worst < 0.012, "{worst} px");
         assert!(plain > 0.03, "without it too: {plain} px");
+    }
+
+    proptest::proptest! {
+        #[test]
+        fn two_numbers_keep_half_their_digits(first in -1e6f32..1e6, second in -16f32..16.0) {
+            let two = Two::new(first, second);
+            for (kept, given) in [(two.first(), first), (two.second(), second)] {
+                proptest::prop_assert!((kept - given).abs() <= given.abs() / 256.0 + 1e-30, "{kept} {given}");
+            }
+        }
+    }
+
+    #[test]
+    fn two_numbers_are_finite_whatever_they_are_made_of() {
+        let odd = [
+            0.0,
+            -0.0,
+            1e-45,
+            -1e-45,
+            f32::MAX,
+            f32::MIN,
+            f32::NAN,
+            f32::INFINITY,
+            1.0,
+            -2.0,
+        ];
+        for (a, b) in odd.iter().flat_map(|&a| odd.iter().map(move |&b| (a, b))) {
+            let two = Two::new(a, b);
+            assert!(two.first().is_finite(), "{a} {b}");
+            assert!(!two.second().is_nan(), "{a} {b}");
+        }
     }
 
     #[test]

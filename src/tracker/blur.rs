@@ -158,10 +158,11 @@ impl Tracker<'_> {
         let whole = nearest_step(shift_px, stride);
         let overlap = Overlap::new(width, whole)?;
         let coefficients = self.storage.coefficients.get(row * width..)?.get(..width)?;
-        let (product, _) = P::sums(
+        let (product, _) = P::part_sums(
             self.config.kernel,
             pixels.get(overlap.line)?,
-            coefficients.get(overlap.reference)?,
+            coefficients,
+            overlap.reference.start,
         );
         let product = product * self.to_reference;
         let near = table.shift_of_smeared_px(product, smear.variance_px2, smear.skew_px3);

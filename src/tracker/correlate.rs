@@ -105,10 +105,11 @@ impl Tracker<'_> {
         let mut converged = false;
         for _ in 0..turns {
             let overlap = Overlap::new(width, whole)?;
-            let (product, sum) = P::sums(
+            let (product, sum) = P::part_sums(
                 self.config.kernel,
                 pixels.get(overlap.line)?,
-                coefficients.get(overlap.reference)?,
+                coefficients,
+                overlap.reference.start,
             );
             let unseen: u32 = mean
                 .get(overlap.unseen)?
@@ -133,5 +134,6 @@ impl Tracker<'_> {
 /// A row of a buffer that holds one row after the other.
 #[inline(always)]
 pub(super) fn part<T>(buffer: &[T], row: usize, width: usize) -> Option<&[T]> {
-    buffer.get(row * width..)?.get(..width)
+    let first = row * width;
+    buffer.get(first..first + width)
 }

@@ -8,7 +8,7 @@ use super::{RowLearning, Stage, Tracker};
 use crate::{
     align::Averaging,
     pixel::Pixel,
-    reference::{Build, Parts},
+    reference::{Build, Parts, RowTable},
 };
 
 /// What following remembers.
@@ -35,13 +35,26 @@ enum Work {
     },
     /// The row's coefficients are built anew.
     Build { row: usize, build: Build },
-    /// All rows are moved to the right by `by_px`; those from `next` on are still where they were.
-    Move { by_px: i32, next: usize },
+    /// They are there, with their table, and become what the kernel keeps; the next column.
+    Keep {
+        row: usize,
+        table: RowTable,
+        column: usize,
+    },
+    /// All rows are moved to the right by `by_px`; those from `next` on are still where they were. First the mean of a row,
+    /// then its coefficients.
+    Move {
+        by_px: i32,
+        next: usize,
+        mean_moved: bool,
+    },
 }
 
 /// One row in so many frames takes a little of the picture: building its coefficients anew is what costs. All
-/// 240 rows at 60 fps have had their turn in a minute, and the reference forgets over a quarter of an hour.
+/// 240 rows at 60 fps have had their turn in a minute, and the reference forgets over a quarter of an hour; where a line
+/// time is short, in twice as long.
 const FRAMES_A_ROW: u32 = 16;
+const FRAMES_A_ROW_IN_A_HURRY: u32 = 32;
 
 /// The reference forgets over so many turns of a row: its noise is then that of twice as many frames.
 const MEMORY_FRAMES: u16 = 16;
@@ -72,11 +85,15 @@ impl Tracker<'_> {
     /// The row whose turn it is in this frame; rows far apart follow each other.
     pub(super) fn turn_of(&self, frame: u32) -> usize {
         let free = self.stage == Stage::Tracking && !self.follow.is_busy();
-        if !free || !frame.is_multiple_of(FRAMES_A_ROW) {
+        let frames = match self.is_hurried() {
+            true => FRAMES_A_ROW_IN_A_HURRY,
+            false => FRAMES_A_ROW,
+        };
+        if !free || !frame.is_multiple_of(frames) {
             return usize::MAX;
         }
         // 619 is prime: every row has its turn.
-        (frame / FRAMES_A_ROW).wrapping_mul(619) as usize % usize::from(self.config.rows)
+        (frame / frames).wrapping_mul(619) as usize % usize::from(self.config.rows)
     }
 
     /// The reference of a row that was looked at and fitted is to take a little of it.
@@ -114,7 +131,7 @@ impl Tracker<'_> {
                     return 0.0;
                 }
                 // Many pixels go into one.
-                let columns = columns.div_ceil(4);
+                let columns = columns.div_ceil(2);
                 let span = *column..column.saturating_add(columns).min(width);
                 *column = span.end;
                 if let Some(mean) = s.mean.get_mut(row * width..(row + 1) * width) {
@@ -134,25 +151,62 @@ impl Tracker<'_> {
                     coefficients: s.fresh,
                 };
                 if let Some(table) = build.advance(columns, parts) {
+                    self.follow.work = Work::Keep {
+                        row: *row,
+                        table,
+                        column: 0,
+                    };
+                }
+            }
+            Work::Keep { row, table, column } => {
+                let kernel = self.config.kernel;
+                if *column == 0 && !kernel.can_keep(s.fresh) {
+                    *table = table.without_texture();
+                }
+                // Two by two.
+                let columns = columns.saturating_mul(2);
+                let span = *column..column.saturating_add(columns).min(width);
+                *column = span.end;
+                if let Some(span) = s.fresh.get_mut(span) {
+                    kernel.keep_some(span);
+                }
+                if *column == width || !kernel.keeps_pairs() {
+                    let span = *row * width..(*row + 1) * width;
                     if let (Some(coefficients), Some(slot)) =
                         (s.coefficients.get_mut(span), s.tables.get_mut(*row))
                     {
                         coefficients.copy_from_slice(s.fresh);
-                        *slot = table;
+                        *slot = *table;
                     }
                     self.follow.work = Work::Nothing;
                 }
             }
-            Work::Move { by_px, next } => {
+            Work::Move {
+                by_px,
+                next,
+                mean_moved,
+            } => {
                 let by_px = *by_px;
                 let span = *next * width..(*next + 1) * width;
-                if let (Some(coefficients), Some(mean)) =
-                    (s.coefficients.get_mut(span.clone()), s.mean.get_mut(span))
+                // Where a line time is short one after the other; the row of this line must not be moved by half, as it would
+                // be if it were the next one.
+                let at_once = columns >= width;
+                if !*mean_moved
+                    && (at_once || row != *next)
+                    && let Some(mean) = s.mean.get_mut(span.clone())
                 {
-                    move_row(coefficients, by_px);
                     move_row(mean, by_px);
+                    *mean_moved = true;
+                    if !at_once {
+                        return if row >= *next { by_px as f32 } else { 0.0 };
+                    }
                 }
-                *next += 1;
+                if *mean_moved && let Some(coefficients) = s.coefficients.get_mut(span) {
+                    let kernel = self.config.kernel;
+                    kernel.move_kept(coefficients, by_px, move_row);
+                    *mean_moved = false;
+                    *next += 1;
+                }
                 let left = row >= *next;
                 if *next >= usize::from(self.config.rows) {
                     self.follow.work = Work::Nothing;
@@ -180,12 +234,14 @@ impl Tracker<'_> {
             s.coefficients.get_mut(span),
             s.tables.get_mut(row),
         ) {
-            *slot = build.all(&mut Parts {
+            let table = build.all(&mut Parts {
                 mean,
                 mask: s.mask,
                 scratch: s.scratch,
                 coefficients,
             });
+            let kept = self.config.kernel.keep(coefficients);
+            *slot = if kept { table } else { table.without_texture() };
         }
     }
 
@@ -202,7 +258,11 @@ impl Tracker<'_> {
         let stride = i32::from(self.config.stride);
         let by_px = stride * if self.follow.drift_px > 0.0 { 1 } else { -1 };
         // A row that is being followed will have another turn.
-        self.follow.work = Work::Move { by_px, next: 0 };
+        self.follow.work = Work::Move {
+            by_px,
+            next: 0,
+            mean_moved: false,
+        };
         self.follow.anchor_px += by_px as f32;
         self.follow.drift_px -= by_px as f32;
         self.prediction.move_by(-by_px as f32);

@@ -7,7 +7,7 @@ pub(super) trait Summed {
     /// How many they are.
     fn len(&self) -> usize;
     /// Σ h·p and Σ p of all of them, as [`Pixel::sums`].
-    fn sums(&self, kernel: Kernel, coefficients: &[i8]) -> (f32, f32);
+    fn sums(&self, kernel: Kernel, row: &[i8]) -> (f32, f32);
 }
 
 /// The pixels of a line.
@@ -24,8 +24,8 @@ impl<P: Pixel> Summed for &[P] {
         <[P]>::len(self)
     }
     #[inline(always)]
-    fn sums(&self, kernel: Kernel, coefficients: &[i8]) -> (f32, f32) {
-        P::sums(kernel, self, coefficients)
+    fn sums(&self, kernel: Kernel, row: &[i8]) -> (f32, f32) {
+        P::sums(kernel, self, row)
     }
 }
 
@@ -66,9 +66,9 @@ impl Summed for UpperBytes<'_> {
         UpperBytes::len(self)
     }
     #[inline(always)]
-    fn sums(&self, kernel: Kernel, coefficients: &[i8]) -> (f32, f32) {
-        let sums = UpperBytes::sums(self, kernel, coefficients);
-        (sums.product as i32 as f32, sums.pixels as u32 as f32)
+    fn sums(&self, kernel: Kernel, row: &[i8]) -> (f32, f32) {
+        let sums = UpperBytes::sums(self, kernel, row);
+        (sums.product as f32, sums.pixels as f32)
     }
 }
 
@@ -76,8 +76,8 @@ impl Summed for Scattered<'_> {
     fn len(&self) -> usize {
         self.upper.len()
     }
-    fn sums(&self, kernel: Kernel, coefficients: &[i8]) -> (f32, f32) {
-        Summed::sums(&self.upper, kernel, coefficients)
+    fn sums(&self, kernel: Kernel, row: &[i8]) -> (f32, f32) {
+        Summed::sums(&self.upper, kernel, row)
     }
 }
 

@@ -7,7 +7,8 @@ use crate::reference::RowTable;
 /// path itself reads width + 16 bytes a row.
 #[derive(Debug)]
 pub struct Storage<'a> {
-    /// width × rows: the coefficients of the inner products.
+    /// width × rows: the coefficients of the inner products, as the kernel keeps them
+    /// ([`Kernel::keep`](crate::kernel::Kernel::keep)).
     pub coefficients: &'a mut [i8],
     /// rows: what the line path needs besides.
     pub tables: &'a mut [RowTable],

@@ -10,7 +10,7 @@ fn main() {
 mod on_the_board {
     use core::fmt::Write;
     use cortex_m_rt::entry;
-    use rowtone::kernel::{Kernel, MAX_COEFFICIENT, Sums};
+    use rowtone::kernel::{Kernel, LineSums, MAX_COEFFICIENT, Sums};
     use rowtone_mps2_an505::board::{counter::Counter, host, uart::Uart};
     use static_cell::ConstStaticCell;
 
@@ -26,6 +26,7 @@ mod on_the_board {
     static PIXELS: ConstStaticCell<Line<u8>> = ConstStaticCell::new(Line([0; LONGEST + STARTS]));
     static COEFFICIENTS: ConstStaticCell<Line<i8>> =
         ConstStaticCell::new(Line([0; LONGEST + STARTS]));
+    static KEPT: ConstStaticCell<Line<i8>> = ConstStaticCell::new(Line([0; LONGEST + STARTS]));
 
     #[entry]
     fn start() -> ! {
@@ -35,7 +36,8 @@ mod on_the_board {
     }
 
     fn run(uart: &mut Uart) -> Option<()> {
-        let (Line(pixels), Line(coefficients)) = (PIXELS.take(), COEFFICIENTS.take());
+        let (Line(pixels), Line(coefficients), Line(kept)) =
+            (PIXELS.take(), COEFFICIENTS.take(), KEPT.take());
         let mut cases = 0u32;
         for pattern in 0..5 {
             fill(pattern, pixels, coefficients);
@@ -52,23 +54,60 @@ mod on_the_board {
                     cases += 1;
                 }
             }
+            for n in (0..=EVERY).chain([512, 640, 1023, 8192]) {
+                for (p, h) in (0..STARTS).flat_map(|p| (0..STARTS).map(move |h| (p, h))) {
+                    let (line, row) = (pixels.get(p..p + n)?, kept.get_mut(h..h + n)?);
+                    row.copy_from_slice(coefficients.get(h..h + n)?);
+                    // Where it cannot be kept, its parts are right nevertheless.
+                    let first = usize::from(!Kernel::detect().keep(row));
+                    for from in first..STARTS.min(n) {
+                        let line = line.get(..n - from)?;
+                        let own = match from {
+                            0 => Kernel::detect().kept_u8(line, row),
+                            _ => Kernel::detect().kept_part_u8(line, row, from),
+                        };
+                        let exact = one_by_one(line, Kernel::detect().kept_coefficients(row, from));
+                        if own != exact {
+                            let _ = writeln!(uart, "kernel: from {from}: {own:?}, not {exact:?}");
+                            return wrong(
+                                uart,
+                                (pattern, n, p, h),
+                                Sums::default(),
+                                Sums::default(),
+                            );
+                        }
+                        cases += 1;
+                    }
+                }
+            }
         }
         let _ = writeln!(
             uart,
             "kernel: {cases} lines, all with the portable one's bits"
         );
         let counter = Counter::new(cortex_m::Peripherals::take()?.SYST);
+        let begin = counter.start();
+        let nothing = counter.instructions(begin);
         for (n, start) in [(64, 0), (256, 0), (320, 0), (256, 1)] {
-            let (line, row) = (pixels.get(start..start + n)?, coefficients.get(..n)?);
+            let (line, row) = (pixels.get(start..start + n)?, kept.get(..n)?);
             let begin = counter.start();
-            core::hint::black_box(Kernel::detect().sums_u8(line, row));
-            let instructions = counter.instructions(begin);
+            core::hint::black_box(Kernel::detect().kept_u8(line, row));
+            let instructions = counter.instructions(begin) - nothing;
             let _ = writeln!(
                 uart,
                 "kernel: {n} px, {start} beyond a word: {instructions} instructions"
             );
         }
         Some(())
+    }
+
+    /// One pixel after the other.
+    fn one_by_one(line: &[u8], coefficients: impl Iterator<Item = i8>) -> LineSums {
+        let pairs = line.iter().zip(coefficients);
+        pairs.fold(LineSums::default(), |sums, (&p, h)| LineSums {
+            product: sums.product + i32::from(p) * i32::from(h),
+            pixels: sums.pixels + u32::from(p),
+        })
     }
 
     #[cold]
