@@ -7,10 +7,12 @@
 mod binner;
 mod group;
 mod ladder;
+mod lateness;
 
 pub use binner::Binner;
-pub(crate) use binner::RowShift;
+pub(crate) use binner::{Begin, RowShift};
 pub use group::{BinnerError, Group, rows_per_sample};
+pub(crate) use lateness::Lateness;
 
 /// How far one row is shifted against its reference.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -8,6 +8,7 @@
 use super::{
     Curvature, Displacement, Group, Sample, Spread,
     ladder::{Ladder, Moments},
+    lateness::Lateness,
 };
 
 /// Rows of a sample are combined by their information, so none may be worth more than this, 1/px².
@@ -23,6 +24,19 @@ pub(crate) struct RowShift {
     pub(crate) row: u16,
     pub(crate) shift_px: f32,
     pub(crate) information_per_px2: f32,
+}
+
+/// What is asked of the first row of a group.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Begin {
+    /// Middle of its exposure, ns on the camera's clock.
+    pub(crate) middle_ns: i64,
+    pub(crate) curvature: Curvature,
+    /// The factor that brings the row to its reference's brightness. How it changes until the next group begins tells by
+    /// how much this group's rows were exposed later than their middles ([`Lateness`]).
+    pub(crate) to_reference: f32,
+    /// What comes on top of the shifts of all rows of the group, px.
+    pub(crate) anchor_px: f32,
 }
 
 /// The group being filled.
@@ -43,6 +57,10 @@ struct Open {
     weighted_shift: f32,
     /// Σ information·(how much later a row was exposed than its place says, ns).
     weighted_later: f32,
+    /// The row that came first, and its brightness ([`Begin::to_reference`]).
+    bright_row: u16,
+    to_reference: f32,
+    anchor_px: f32,
 }
 
 impl Open {
@@ -63,6 +81,7 @@ impl Open {
     }
 
     /// At least half of its rows came.
+    #[inline(always)]
     fn is_thick(&self) -> bool {
         let passed = self.next_row.wrapping_sub(self.first_row);
         let came = u32::from(passed.wrapping_sub(self.missing));
@@ -98,6 +117,9 @@ pub struct Binner {
     thin_groups: u32,
     /// Of the group being filled.
     curvature: Curvature,
+    lateness: Lateness,
+    /// How much later than their middles the rows of the group before were exposed, ns: so may this one's be.
+    late_ns: f32,
 }
 
 impl Binner {
@@ -111,6 +133,8 @@ impl Binner {
             lost_frames: 0,
             thin_groups: 0,
             curvature: Curvature::default(),
+            lateness: Lateness::new(&group.timing()),
+            late_ns: 0.0,
         }
     }
 
@@ -144,8 +168,14 @@ impl Binner {
             shift_px,
             information_per_px2: information.min(MOST_INFORMATION),
         };
-        let curvature = self.curvature;
-        let done = self.push_row(row, || (d.time_ns, curvature));
+        let begin = Begin {
+            middle_ns: d.time_ns,
+            curvature: self.curvature,
+            // Its time tells how late it was.
+            to_reference: 1.0,
+            anchor_px: 0.0,
+        };
+        let done = self.push_row(row, || begin);
         let place = self.group.timing().start_ns(d.row - self.open.first_row);
         let later_ns = d
             .time_ns
@@ -154,25 +184,26 @@ impl Binner {
         done
     }
 
-    /// [`Binner::push`] for a row of this timing that is exposed when its place says. `begin`: middle of its
-    /// exposure, ns on the camera's clock, and the rows' curvature; asked where a group begins.
+    /// [`Binner::push`] for a row of this timing that is exposed when its place says. `begin` is asked where a group
+    /// begins.
     #[inline(always)]
-    pub(crate) fn push_row(
-        &mut self,
-        row: RowShift,
-        begin: impl Fn() -> (i64, Curvature),
-    ) -> Option<Sample> {
+    pub(crate) fn push_row(&mut self, row: RowShift, begin: impl Fn() -> Begin) -> Option<Sample> {
         let open = &mut self.open;
         if row.row == open.next_row && row.row < open.end_row && row.frame == open.frame {
             open.add(row);
             return None;
         }
-        self.push_elsewhere(row, begin())
+        let RowShift {
+            frame,
+            row,
+            shift_px,
+            information_per_px2,
+        } = row;
+        self.push_elsewhere(frame, row, shift_px, information_per_px2, begin())
     }
 
     /// The row pushed last was exposed so much later than its place says, ns.
-    #[inline]
-    pub(crate) fn note_later(&mut self, information_per_px2: f32, later_ns: f32) {
+    fn note_later(&mut self, information_per_px2: f32, later_ns: f32) {
         self.open.weighted_later += information_per_px2 * later_ns;
     }
 
@@ -184,9 +215,38 @@ impl Binner {
     #[inline(never)]
     fn push_elsewhere(
         &mut self,
-        row: RowShift,
-        (middle_ns, curvature): (i64, Curvature),
+        frame: u32,
+        row: u16,
+        shift_px: f32,
+        information_per_px2: f32,
+        begin: Begin,
     ) -> Option<Sample> {
+        // One by one, or every row would be written to memory for the sake of those that come here.
+        let row = RowShift {
+            frame,
+            row,
+            shift_px,
+            information_per_px2,
+        };
+        // The next group's first row: most come so.
+        let follows = frame == self.open.frame && row.row == self.open.end_row && row.row > 0;
+        if !follows {
+            return self.push_far(row, begin);
+        }
+        self.settle_lateness(&row, begin.to_reference);
+        let done = self.close();
+        let open = &mut self.open;
+        open.slot += 1;
+        open.first_row = row.row;
+        open.missing = 0;
+        open.first_ns = begin.middle_ns;
+        self.open_with(row, &begin);
+        done
+    }
+
+    /// A row that is neither the next of its group nor the first of the next group.
+    #[inline(never)]
+    fn push_far(&mut self, row: RowShift, begin: Begin) -> Option<Sample> {
         if self.is_open_for(row.frame, row.row) {
             if row.row >= self.open.next_row {
                 self.open.skip_to(row.row);
@@ -194,32 +254,60 @@ impl Binner {
             }
             return None;
         }
+        self.settle_lateness(&row, begin.to_reference);
         let done = self.finish();
-        self.curvature = curvature;
         if self.open.frame != row.frame || self.last_frame.is_none() {
             self.count_lost(row.frame);
+            self.late_ns = 0.0;
         }
-        let slot = row.row / self.group.rows_per_sample();
+        let rows_per_sample = self.group.rows_per_sample();
         let open = &mut self.open;
         open.frame = row.frame;
-        open.slot = slot;
-        open.first_row = slot * self.group.rows_per_sample();
-        open.end_row = open.first_row + self.group.rows_of(slot);
+        open.slot = row.row / rows_per_sample;
+        open.first_row = open.slot * rows_per_sample;
         open.missing = row.row - open.first_row;
-        open.first_ns = middle_ns;
+        open.first_ns = begin.middle_ns;
         if open.missing > 0 {
             let before_ns = self.group.timing().start_ns(open.missing);
-            open.first_ns = middle_ns.saturating_sub(before_ns);
+            open.first_ns = begin.middle_ns.saturating_sub(before_ns);
         }
+        self.open_with(row, &begin);
+        done
+    }
+
+    /// The rest of what begins a group.
+    #[inline(always)]
+    fn open_with(&mut self, row: RowShift, begin: &Begin) {
+        let open = &mut self.open;
+        let end_row = open.first_row.saturating_add(self.group.rows_per_sample());
+        open.end_row = end_row.min(self.group.timing().rows());
         open.information = Ladder::default();
         open.weighted_shift = 0.0;
         open.weighted_later = 0.0;
+        (open.bright_row, open.to_reference) = (row.row, begin.to_reference);
+        open.anchor_px = begin.anchor_px;
         open.add(row);
-        done
+        self.curvature = begin.curvature;
+    }
+
+    /// How late the group being filled was, now that the first row behind it is known.
+    #[inline(always)]
+    fn settle_lateness(&mut self, next: &RowShift, to_reference: f32) {
+        let open = &self.open;
+        if next.frame == open.frame && next.row > open.bright_row {
+            let rows = f32::from(next.row - open.bright_row);
+            let late_ns = self.lateness.late_ns(open.to_reference, to_reference, rows);
+            self.late_ns = late_ns.unwrap_or(self.late_ns);
+        }
     }
 
     /// Gives the group being filled: at the end of the input.
     pub fn finish(&mut self) -> Option<Sample> {
+        self.close()
+    }
+
+    #[inline(always)]
+    fn close(&mut self) -> Option<Sample> {
         let open = &mut self.open;
         if open.end_row == 0 {
             return None;
@@ -232,7 +320,7 @@ impl Binner {
         }
         let information_per_px2 = open.information.weight();
         let per_information = 1.0 / information_per_px2;
-        let shift_px = open.weighted_shift * per_information;
+        let shift_px = open.weighted_shift * per_information + open.anchor_px;
         if !shift_px.is_finite() {
             return None;
         }
@@ -242,7 +330,8 @@ impl Binner {
             third,
         } = open.information.moments(per_information);
         let rows = f32::from(open.next_row.wrapping_sub(open.first_row)) - to_next;
-        let later_ns = rows * self.line_ns + open.weighted_later * per_information;
+        let own_ns = self.late_ns + open.weighted_later * per_information;
+        let later_ns = rows * self.line_ns + own_ns;
         let later_ns = if later_ns.abs() < 1e9 {
             // The nearest, as fast as a cast.
             i64::from((later_ns + 0.5f32.copysign(later_ns)) as i32)
@@ -297,6 +386,7 @@ mod tests {
     extern crate std;
     use super::*;
     use crate::camera::Timing;
+    use std::vec::Vec;
 
     fn group() -> Group {
         Group::new(Timing::new(10_000_000, 0, 8).unwrap(), 4).unwrap()
@@ -322,6 +412,55 @@ mod tests {
         assert_eq!(sample.shift_px, 18.0 / 8.0);
         assert_eq!(sample.time_ns, 22_500);
         assert_eq!(sample.information_per_px2, 8.0);
+    }
+
+    /// Rows of a light that changes by `change` a row (of the factor that undoes it), 0.1 ms apart and exposed for 2 ms:
+    /// 3.33 ms·change late.
+    fn late_ns(change: f32, rows: core::ops::Range<u16>) -> Vec<i64> {
+        let timing = Timing::new(100_000_000, 2_000_000, 8).unwrap();
+        let mut binner = Binner::new(Group::new(timing, 4).unwrap());
+        let mut samples = Vec::new();
+        for frame in 0..2u32 {
+            for y in rows.clone() {
+                let begin = Begin {
+                    middle_ns: i64::from(y) * 100_000,
+                    curvature: Curvature::default(),
+                    to_reference: 1.0 - change * f32::from(y),
+                    anchor_px: 0.25,
+                };
+                let row = RowShift {
+                    frame,
+                    row: y,
+                    shift_px: 0.5,
+                    information_per_px2: 1.0,
+                };
+                samples.extend(binner.push_row(row, || begin));
+            }
+        }
+        samples.extend(binner.finish());
+        assert!(samples.iter().all(|s| s.shift_px == 0.75));
+        let middle_ns = |s: &Sample| i64::from(s.slot) * 400_000 + 150_000;
+        samples.iter().map(|s| s.time_ns - middle_ns(s)).collect()
+    }
+
+    #[test]
+    fn a_light_that_grows_makes_rows_late_and_a_jump_does_not() {
+        let late = late_ns(0.01, 0..8);
+        // Group by group 33.3 µs over the factor, 1 to 0.96; the frame's last is as late as the one before.
+        assert_eq!(late.len(), 4);
+        assert!(
+            late.iter().all(|ns| (33_000..36_000).contains(ns)),
+            "{late:?}"
+        );
+        assert!(
+            late_ns(-0.01, 0..8)
+                .iter()
+                .all(|ns| (-34_000..-31_000).contains(ns))
+        );
+        // Less than noise may feign, and more than a lamp does.
+        for change in [0.0002, 0.06, -0.08] {
+            assert_eq!(late_ns(change, 0..8), [0; 4], "{change}");
+        }
     }
 
     #[test]

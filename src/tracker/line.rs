@@ -16,6 +16,7 @@ use crate::{
     kernel,
     pixel::Pixel,
     reference::RowTable,
+    timeline::{Binner, Sample},
 };
 
 /// A line that was looked at and is further than this from where it was expected has jumped, px.
@@ -24,8 +25,20 @@ const JUMP_PX: f32 = 1.0;
 /// Where a line is against the reference, and what it knows of that.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Place {
+    /// Where the reference has been moved to ([`Follow::anchor_px`](super::follow::Follow::anchor_px)) comes on top.
     pub(super) shift_px: f32,
     pub(super) information_per_px2: f32,
+}
+
+/// A quiet line.
+#[derive(Clone, Copy, Debug)]
+struct Measured {
+    shift_px: f32,
+    /// How far from where it was expected.
+    surprise_px: f32,
+    /// The factor that brings it to its reference's brightness.
+    to_reference: f32,
+    information_per_px2: f32,
 }
 
 /// Why a line has none.
@@ -42,24 +55,29 @@ pub(super) enum Left {
 pub(super) struct Quiet {
     frame: u32,
     until_row: u16,
+    /// Those below this one would be, but that they are looked at or that something is done beside them.
+    calm_until_row: u16,
 }
 
 impl Quiet {
     /// None.
     pub(super) fn end(&mut self) {
         self.until_row = 0;
+        self.calm_until_row = 0;
     }
 }
 
 /// Σ h·p and Σ p of a line, where they were taken.
-type Sums = Option<(f32, f32)>;
+pub(super) type Sums = Option<(f32, f32)>;
 
 impl Tracker<'_> {
-    /// Takes one line.
+    /// Takes one line, whatever comes of it.
     #[inline(always)]
     pub(super) fn take<R: Row>(&mut self, line: &Line<'_>, pixels: R) -> Result<Place, Left> {
-        self.take_quietly(line, &pixels)
-            .or_else(|sums| self.take_with_care(line, pixels, sums))
+        match self.take_quietly(line, &pixels, true) {
+            Ok(place) => Ok(place),
+            Err(sums) => self.take_otherwise(line, pixels, sums),
+        }
     }
 
     /// Takes one whose pixels do not lie side by side. They are lent: a copy would read as one what was just written
@@ -70,12 +88,14 @@ impl Tracker<'_> {
         line: &Line<'_>,
         upper: &UpperBytes<'_>,
     ) -> Result<Place, Left> {
-        self.take_quietly(line, upper)
-            .or_else(|sums| self.take_scattered_with_care(line, upper, sums))
+        match self.take_quietly(line, upper, true) {
+            Ok(place) => Ok(place),
+            Err(sums) => self.take_scattered_otherwise(line, upper, sums),
+        }
     }
 
     #[inline(never)]
-    fn take_scattered_with_care(
+    fn take_scattered_otherwise(
         &mut self,
         line: &Line<'_>,
         upper: &UpperBytes<'_>,
@@ -83,51 +103,168 @@ impl Tracker<'_> {
     ) -> Result<Place, Left> {
         let room = core::mem::take(&mut self.room);
         let place = match Scattered::new(*upper, self.config.kernel, &mut *room) {
-            Some(row) => self.take_with_care(line, row, sums),
+            Some(row) => self.take_otherwise(line, row, sums),
             None => Err(self.misfit()),
         };
         self.room = room;
         place
     }
 
-    /// What every line takes. Nothing has changed where it is refused.
+    #[inline(never)]
+    pub(super) fn take_scattered_otherwise_into(
+        &mut self,
+        line: &Line<'_>,
+        upper: &UpperBytes<'_>,
+        sums: Sums,
+        binner: &mut Binner,
+    ) -> Option<Sample> {
+        let room = core::mem::take(&mut self.room);
+        let sample = match Scattered::new(*upper, self.config.kernel, &mut *room) {
+            Some(row) => self.take_otherwise_into(line, row, sums, binner),
+            None => {
+                self.misfit();
+                None
+            }
+        };
+        self.room = room;
+        sample
+    }
+
+    /// Takes a line that was not quiet; apart from those that are, so that what they come to stays in registers.
+    #[inline(never)]
+    fn take_otherwise<R: Row>(
+        &mut self,
+        line: &Line<'_>,
+        mut pixels: R,
+        sums: Sums,
+    ) -> Result<Place, Left> {
+        match self.take_calmly(line, &mut pixels, sums, true) {
+            Ok(place) => Ok(place),
+            Err(sums) => self.take_with_care(line, pixels, sums),
+        }
+    }
+
+    /// [`Tracker::take_otherwise`], and what it measures is passed on.
+    #[inline(never)]
+    pub(super) fn take_otherwise_into<R: Row>(
+        &mut self,
+        line: &Line<'_>,
+        mut pixels: R,
+        sums: Sums,
+        binner: &mut Binner,
+    ) -> Option<Sample> {
+        let place = match self.take_calmly(line, &mut pixels, sums, false) {
+            Ok(place) => place,
+            Err(sums) => self.take_with_care(line, pixels, sums).ok()?,
+        };
+        self.pass_on(line, place, self.curvature(), binner)
+    }
+
+    /// What every line takes. Nothing has changed where it is refused. `times`: how late it was exposed is asked
+    /// afterwards.
     #[inline(always)]
-    fn take_quietly<R: Summed>(&mut self, line: &Line<'_>, pixels: &R) -> Result<Place, Sums> {
-        if line.row >= self.quiet.until_row
-            || line.frame != self.quiet.frame
-            || pixels.len() != usize::from(self.config.width)
-        {
+    pub(super) fn take_quietly<R: Summed>(
+        &mut self,
+        line: &Line<'_>,
+        pixels: &R,
+        times: bool,
+    ) -> Result<Place, Sums> {
+        let quiet = line.row < self.quiet.until_row
+            && line.frame == self.quiet.frame
+            && pixels.len() == usize::from(self.config.width);
+        if !quiet {
             return Err(None);
         }
-        let row = usize::from(line.row);
-        let expected = self.prediction.rest_px();
+        let quiet = self.measure_quietly(usize::from(line.row), pixels)?;
+        Ok(self.accept(quiet, times))
+    }
+
+    /// What a line comes to where the picture has moved little; the light as it was with the line before is still there.
+    #[inline(always)]
+    fn measure_quietly<R: Summed>(&self, row: usize, pixels: &R) -> Result<Measured, Sums> {
         let (Some(table), Some(coefficients)) = (
             self.storage.tables.get(row),
-            part(self.storage.coefficients, row, pixels.len()),
+            part(
+                self.storage.coefficients,
+                row,
+                usize::from(self.config.width),
+            ),
         ) else {
             return Err(None);
         };
-        if !table.has_texture() || expected.abs() >= self.half_step_px {
+        if !table.has_texture() {
             return Err(None);
         }
         let (product, sum) = pixels.sums(self.config.kernel, coefficients);
-        let (before, now) = (self.to_reference, table.factor_to_reference(sum));
-        let shift_px = table.shift_px(product * now);
-        let surprise = shift_px - expected;
+        let to_reference = table.factor_to_reference(sum);
+        let shift_px = table.shift_px(product * to_reference);
+        let surprise_px = shift_px - self.prediction.rest_px();
         // Neither is true of what is no number.
-        let small = shift_px.abs() <= self.near_px && Prediction::is_small(surprise);
-        if !small || !Flicker::is_plausible(before, now) {
+        let small = shift_px.abs() <= self.near_px && Prediction::is_small(surprise_px);
+        if !small || !Flicker::is_plausible(self.to_reference, to_reference) {
             return Err(Some((product, sum)));
         }
-        let information_per_px2 = table.information_per_px2();
-        self.to_reference = now;
-        self.flicker.add_settled(before, now);
-        self.prediction.add_at_rest(surprise, information_per_px2);
-        self.counts.measured = self.counts.measured.wrapping_add(1);
-        Ok(Place {
-            shift_px: shift_px + self.follow.anchor_px(),
-            information_per_px2,
+        Ok(Measured {
+            shift_px,
+            surprise_px,
+            to_reference,
+            information_per_px2: table.information_per_px2(),
         })
+    }
+
+    #[inline(always)]
+    fn accept(&mut self, measured: Measured, times: bool) -> Place {
+        let Measured {
+            shift_px,
+            surprise_px,
+            to_reference,
+            information_per_px2,
+        } = measured;
+        if times {
+            self.flicker.add_settled(self.to_reference, to_reference);
+        }
+        self.to_reference = to_reference;
+        self.prediction
+            .add_at_rest(surprise_px, information_per_px2);
+        self.counts.measured = self.counts.measured.wrapping_add(1);
+        Place {
+            shift_px,
+            information_per_px2,
+        }
+    }
+
+    /// A line that would be quiet, but that it is looked at or that something is done beside it. Where it is refused nothing
+    /// has changed but that.
+    #[inline(always)]
+    fn take_calmly<R: Row>(
+        &mut self,
+        line: &Line<'_>,
+        pixels: &mut R,
+        sums: Sums,
+        times: bool,
+    ) -> Result<Place, Sums> {
+        let calm = line.row < self.quiet.calm_until_row && line.frame == self.quiet.frame;
+        if !calm || sums.is_some() || pixels.len() != usize::from(self.config.width) {
+            return Err(sums);
+        }
+        let row = usize::from(line.row);
+        let measured = self.measure_quietly(row, pixels)?;
+        if row >= self.attend {
+            let before = core::mem::replace(&mut self.to_reference, measured.to_reference);
+            let fits = self.fits(row, pixels.pixels(), measured.shift_px);
+            self.to_reference = before;
+            if !fits {
+                return Err(None);
+            }
+            self.note_fit(true);
+            self.after_look(row, pixels.pixels(), Some(measured.shift_px));
+        } else if self.beside {
+            // The reference is not being moved.
+            self.work_beside::<R::P>(row);
+        }
+        let place = self.accept(measured, times);
+        self.settle_quiet(line.frame);
+        Ok(place)
     }
 
     /// Everything that a line may come to.
@@ -163,10 +300,7 @@ impl Tracker<'_> {
             Err(_) => &mut counts.no_texture,
         };
         *count = count.wrapping_add(1);
-        found.map(|place| Place {
-            shift_px: place.shift_px + self.follow.anchor_px(),
-            ..place
-        })
+        found
     }
 
     fn misfit(&mut self) -> Left {
@@ -177,15 +311,19 @@ impl Tracker<'_> {
     /// Which lines will be quiet, after one that was not: none while something is done beside them, while the
     /// motion is swift, and at the beginning of a frame.
     fn settle_quiet(&mut self, frame: u32) {
-        let quiet = !self.beside && self.prediction.is_at_rest() && self.flicker.is_settled();
+        // Where lines are expected then stays between the shifts of those before, none of which is further than `near_px`.
+        let near = self.prediction.rest_px().abs() < self.half_step_px;
+        let undisturbed = !self.follow.is_moving() && !self.watch.is_searching();
+        let calm = undisturbed && self.prediction.is_at_rest() && self.flicker.is_settled() && near;
         let rows = usize::from(self.config.rows);
         self.quiet = Quiet {
             frame,
-            until_row: if quiet {
+            until_row: if calm && !self.beside {
                 self.attend.min(rows) as u16
             } else {
                 0
             },
+            calm_until_row: if calm { rows as u16 } else { 0 },
         };
     }
 
@@ -316,12 +454,18 @@ impl Tracker<'_> {
         shift_px: f32,
     ) -> Option<f32> {
         let looked = self.look(row, table, pixels, shift_px);
+        self.after_look(row, pixels, looked);
+        looked
+    }
+
+    /// `looked`: the shift of a line that was found to fit.
+    fn after_look<P: Pixel>(&mut self, row: usize, pixels: &[P], looked: Option<f32>) {
         if let Some(shift_px) = looked
             && self.turn == row
         {
             self.follow_row(row, pixels, shift_px);
         }
-        self.attend = self.watch.next_due(row);
+        self.attend = self.watch.next_due(row, self.is_hurried());
         if self.turn > row {
             self.attend = self.attend.min(self.turn);
         }
@@ -330,6 +474,5 @@ impl Tracker<'_> {
         let width = usize::from(self.config.width);
         let mean = self.storage.mean.get(self.attend * width..);
         kernel::ask_for(mean.and_then(|m| m.get(..width)).unwrap_or_default());
-        looked
     }
 }

@@ -36,7 +36,7 @@ use crate::{
     camera::{Line, Pixels, UpperBytes},
     noise::{NoiseMeter, PixelNoise},
     reference::{Recipe, RowTable},
-    timeline::{Binner, Curvature, Displacement, RowShift, Sample},
+    timeline::{Begin, Binner, Curvature, Displacement, RowShift, Sample},
 };
 use blur::Blur;
 use correlate::NEAR_WHILE_LEARNING_PX;
@@ -44,6 +44,7 @@ use flicker::Flicker;
 use follow::Follow;
 use line::{Left, Place, Quiet};
 use predict::Prediction;
+use row::Row;
 use watch::Watch;
 
 /// What a line came to.
@@ -235,14 +236,12 @@ impl<'a> Tracker<'a> {
 
     #[inline(never)]
     fn push_u8_into(&mut self, line: &Line<'_>, p: &[u8], binner: &mut Binner) -> Option<Sample> {
-        let place = self.take(line, p);
-        self.pass_on(line, place, binner)
+        self.take_into(line, p, binner)
     }
 
     #[inline(never)]
     fn push_u16_into(&mut self, line: &Line<'_>, p: &[u16], binner: &mut Binner) -> Option<Sample> {
-        let place = self.take(line, p);
-        self.pass_on(line, place, binner)
+        self.take_into(line, p, binner)
     }
 
     #[inline(never)]
@@ -258,8 +257,25 @@ impl<'a> Tracker<'a> {
         pixels: &UpperBytes<'_>,
         binner: &mut Binner,
     ) -> Option<Sample> {
-        let place = self.take_scattered(line, pixels);
-        self.pass_on(line, place, binner)
+        match self.take_quietly(line, pixels, false) {
+            // At rest, so not swift.
+            Ok(place) => self.pass_on(line, place, self.curvature, binner),
+            Err(sums) => self.take_scattered_otherwise_into(line, pixels, sums, binner),
+        }
+    }
+
+    #[inline(always)]
+    fn take_into<R: Row>(
+        &mut self,
+        line: &Line<'_>,
+        pixels: R,
+        binner: &mut Binner,
+    ) -> Option<Sample> {
+        match self.take_quietly(line, &pixels, false) {
+            // At rest, so not swift.
+            Ok(place) => self.pass_on(line, place, self.curvature, binner),
+            Err(sums) => self.take_otherwise_into(line, pixels, sums, binner),
+        }
     }
 
     #[inline(always)]
@@ -268,10 +284,10 @@ impl<'a> Tracker<'a> {
             Ok(place) => Outcome::Measured(Displacement {
                 frame: line.frame,
                 row: line.row,
-                time_ns: self
-                    .middle_ns(line)
-                    .wrapping_add(i64::from(self.delay_ns().unwrap_or(0.0) as i32)),
-                shift_px: place.shift_px,
+                time_ns: self.middle_ns(line).wrapping_add(i64::from(
+                    self.flicker.delay_ns(self.to_reference).unwrap_or(0.0) as i32,
+                )),
+                shift_px: place.shift_px + self.follow.anchor_px(),
                 information_per_px2: place.information_per_px2,
             }),
             Err(Left::Learning) => Outcome::Learning,
@@ -285,24 +301,26 @@ impl<'a> Tracker<'a> {
     fn pass_on(
         &self,
         line: &Line<'_>,
-        place: Result<Place, Left>,
+        place: Place,
+        curvature: Curvature,
         binner: &mut Binner,
     ) -> Option<Sample> {
         let Place {
             shift_px,
             information_per_px2,
-        } = place.ok()?;
+        } = place;
         let row = RowShift {
             frame: line.frame,
             row: line.row,
             shift_px,
             information_per_px2,
         };
-        let done = binner.push_row(row, || (self.middle_ns(line), self.curvature()));
-        if let Some(delay_ns) = self.delay_ns() {
-            binner.note_later(information_per_px2, delay_ns);
-        }
-        done
+        binner.push_row(row, || Begin {
+            middle_ns: self.middle_ns(line),
+            curvature,
+            to_reference: self.to_reference,
+            anchor_px: self.follow.anchor_px(),
+        })
     }
 
     /// Middle of a line's exposure, ns on the camera's clock.
@@ -310,12 +328,6 @@ impl<'a> Tracker<'a> {
     fn middle_ns(&self, line: &Line<'_>) -> i64 {
         line.start_ns
             .wrapping_add(i64::from(self.config.timing.exposure_ns() / 2))
-    }
-
-    /// How much later than that its mean time is, ns; `None` where it is not.
-    #[inline(always)]
-    fn delay_ns(&self) -> Option<f32> {
-        self.flicker.delay_ns(self.to_reference)
     }
 
     /// What a line may need is bounded: not while learning, which cannot be done in a line time.

@@ -12,8 +12,9 @@ use super::{
 };
 use crate::{noise::LEAST_VARIANCE, pixel::Pixel, reference::RowTable};
 
-/// In tracking one row in this many is looked at even if it does not surprise.
+/// In tracking one row in this many is looked at even if it does not surprise; and where a line time is short.
 const EVERY: usize = 32;
+const EVERY_IN_A_HURRY: usize = 64;
 
 /// Columns that are looked at, about: of a line that may be anywhere, of one among others that fitted, and where
 /// a line time is short.
@@ -60,16 +61,17 @@ impl Watch {
     }
 
     /// The next row to be looked at after `row`.
-    pub(super) fn next_due(&self, row: usize) -> usize {
+    pub(super) fn next_due(&self, row: usize, hurried: bool) -> usize {
         if self.every_line {
             return 0;
         }
+        let every = if hurried { EVERY_IN_A_HURRY } else { EVERY };
         let next = row + 1;
-        next + (self.turn + EVERY - next % EVERY) % EVERY
+        next + (self.turn % every + every - next % every) % every
     }
 
     pub(super) fn begin_frame(&mut self, frame: u32) {
-        self.turn = frame as usize % EVERY;
+        self.turn = frame as usize % EVERY_IN_A_HURRY;
         self.every_line = true;
         self.rest = 0;
         self.fitted = 0;
@@ -132,14 +134,14 @@ impl Tracker<'_> {
                 .and_then(|near| self.correlate(row, table, &mut &*pixels, near, None).ok())
                 .filter(|&shift| self.fits(row, pixels, shift));
         }
-        self.watch.rest = self.watch.rest.saturating_sub(1);
         self.note_fit(fit.is_some());
         fit
     }
 
     /// Remembers whether a line that was looked at fitted.
-    fn note_fit(&mut self, fits: bool) {
+    pub(super) fn note_fit(&mut self, fits: bool) {
         self.watch.every_line = !fits;
+        self.watch.rest = self.watch.rest.saturating_sub(1);
         if fits {
             self.watch.fitted += 1;
             self.watch.start = None;
@@ -165,7 +167,7 @@ impl Tracker<'_> {
         self.beside = true;
     }
 
-    fn fits<P: Pixel>(&mut self, row: usize, pixels: &[P], shift_px: f32) -> bool {
+    pub(super) fn fits<P: Pixel>(&mut self, row: usize, pixels: &[P], shift_px: f32) -> bool {
         let Some(rest) = self.rest(row, pixels, shift_px) else {
             return false;
         };
