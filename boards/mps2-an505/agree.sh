@@ -22,7 +22,7 @@ if [ $# = 0 ]; then
     simulate five.y4m
     simulate eight.y4m --tone 410.9:0.05 --tone 525.1:0.03 --tone 611.7:0.03
     set -- "$folder/five.y4m" --line-time-us 66 --exposure-us 500 --window 1.1016
-    max_line=3000 max_spectrum=46875000
+    mean_line=700 max_line=3000 max_spectrum=46875000
 fi
 clip=$(realpath "$1")
 shift
@@ -53,6 +53,7 @@ within() { # FIGURES NAME LIMIT
     [ "$value" -le "$3" ] || { echo "agree.sh: $2=$value is above $3" >&2; exit 1; }
 }
 if [ -n "${max_line:-}" ]; then
+    within "$board" insn_per_line "$mean_line"
     within "$board" max_insn_per_line "$max_line"
     within "$board" max_insn_per_spectrum "$max_spectrum"
     eight=$("$root/boards/mps2-an505/run.sh" "$folder/eight.y4m" "${@}" --icount | grep '^insn_per_line=')

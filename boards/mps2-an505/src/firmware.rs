@@ -71,6 +71,7 @@ fn run(args: &Args, uart: &mut Uart) -> Result<(), Failure> {
         analyzer: analyzer(config, group)?,
         timing,
         per_line: Count::default(),
+        per_nothing: Count::default(),
         per_spectrum: Count::default(),
         per_learning_line: Count::default(),
         per_round: Count::default(),
@@ -104,6 +105,8 @@ struct Board<'a> {
     analyzer: &'static mut Analyzer<'static>,
     timing: Timing,
     per_line: Count,
+    /// Nothing at all: what counting a line takes itself. It is taken off.
+    per_nothing: Count,
     per_spectrum: Count,
     per_learning_line: Count,
     /// What ends a round of learning.
@@ -145,6 +148,12 @@ impl Board<'_> {
     fn measure(&mut self) -> Result<(), Failure> {
         let mut pixels = Pixels8([0; MAX_WIDTH]);
         while let Some(line) = self.lines.next(&mut pixels, &self.timing)? {
+            // What counting itself takes, in the same surroundings.
+            let start = self.counter.as_ref().map(Counter::start);
+            core::hint::black_box(&line);
+            if let (Some(counter), Some(start)) = (&self.counter, start) {
+                self.per_nothing.add(counter.instructions(start));
+            }
             let start = self.counter.as_ref().map(Counter::start);
             let sample = self.tracker.push_into(&line, &mut self.binner);
             if let (Some(counter), Some(start)) = (&self.counter, start) {
@@ -196,20 +205,21 @@ impl Board<'_> {
             "insn_per_line={} max_insn_per_line={} insn_per_spectrum={} stack_max_bytes={} ram_static_bytes={} \
              flash_bytes={} min_insn_per_line={} max_insn_per_spectrum={} \
              spectrum_stack_bytes={} encode_stack_bytes={} insn_per_learning_line={} max_insn_per_learning_line={} \
-             max_insn_per_round={}",
-            self.per_line.mean(),
-            self.per_line.max(),
+             max_insn_per_round={} insn_of_counting={}",
+            self.per_line.mean() - self.per_nothing.min(),
+            self.per_line.max() - self.per_nothing.min(),
             self.per_spectrum.mean(),
             self.stack_bytes.max(stack::used_max_bytes()),
             stack::static_ram_bytes(),
             stack::flash_bytes(),
-            self.per_line.min(),
+            self.per_line.min() - self.per_nothing.min(),
             self.per_spectrum.max(),
             self.spectrum_stack_bytes,
             self.encode_stack_bytes,
             self.per_learning_line.mean(),
             self.per_learning_line.max(),
             self.per_round.max(),
+            self.per_nothing.min(),
         );
     }
 }
