@@ -76,6 +76,8 @@ impl Prediction {
     const MOST_INFORMATION: f32 = 1e4;
     /// Information of a tenth of a pixel, 1/px².
     const SURE: f32 = 100.0;
+    /// Least information of a row that tells of swift motion, as a share of the usual.
+    const LEAST_SHARE: f32 = 1.0 / 64.0;
     /// For so many frames.
     const SWIFT_FRAMES: u8 = 64;
     /// Over more rows than this the speed tells nothing.
@@ -176,6 +178,12 @@ impl Prediction {
         self.is_swift() && self.known == 0 && information < 0.25 * self.usual_information
     }
 
+    /// A row that knows so much less than others tells nothing of the next: some tens of them, noise of an even wall that
+    /// was taken for texture, would lead anywhere.
+    fn is_lost_on(&self, information: f32) -> bool {
+        information < Self::LEAST_SHARE * self.usual_information
+    }
+
     /// It is sure to about a tenth of a pixel.
     pub(super) fn is_sure(&self) -> bool {
         self.information > Self::SURE
@@ -183,6 +191,9 @@ impl Prediction {
 
     /// Takes what a row came to.
     pub(super) fn add(&mut self, row: usize, shift_px: f32, information: f32) {
+        if self.swift_frames > 0 && self.is_lost_on(information) {
+            return;
+        }
         let expected = self.at(row);
         let surprise = shift_px - expected;
         let square = surprise * surprise;
@@ -223,6 +234,9 @@ impl Prediction {
 
     /// The picture jumped: what was expected before is worth nothing.
     pub(super) fn jump(&mut self, row: usize, shift_px: f32, information: f32) {
+        if self.is_lost_on(information) {
+            return;
+        }
         self.forget();
         self.add(row, shift_px, information);
         self.shift_px = shift_px;
