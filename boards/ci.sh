@@ -35,12 +35,12 @@ done
 
 echo "| firmware | flash, bytes | allowed | static RAM, bytes | allowed | allocator |"
 echo "| --- | --- | --- | --- | --- | --- |"
-boards/budget.sh pico2 "$(tools/embedded-cargo.sh --where firmware rowtone-pico2)"
+pico2=$(tools/embedded-cargo.sh --where firmware rowtone-pico2)
+boards/budget.sh pico2 "$pico2"
 boards/budget.sh mps2-an505 "$(tools/embedded-cargo.sh --where firmware rowtone-mps2-an505)"
 
 # Core 1's stack with everything at once, and a panic on top (boards/pico2/README.md): start and executor, a window, in its
 # midst the task that talks with its interrupt, in the midst of that the UART's, and twice what the processor pushes.
-pico2=$(tools/embedded-cargo.sh --where firmware rowtone-pico2)
 deepest() { boards/stack.py "$pico2" "$1" | sort -n | tail -n 1 | cut -d' ' -f1; }
 used=$((512 + $(deepest compute_task) + $(deepest talk_task) + $(deepest SWI_IRQ_1) + $(deepest UART0_IRQ) + 2 * 104 + $(deepest rust_begin_unwind)))
 echo "core 1: $used bytes of stack at most, a panic included, of 16384"
