@@ -18,6 +18,9 @@
 
 mod build;
 
+#[cfg(feature = "long-exposure")]
+use crate::band::{Level, SLOPE};
+
 pub use build::{Build, Parts, Recipe};
 
 /// What the line path needs of a row besides its coefficients: 16 bytes.
@@ -122,6 +125,30 @@ impl RowTable {
         let third = 2.0 * quadratic * quadratic - cubic;
         let excess = variance_px2 * (3.0 * third * d - quadratic) + skew_px3 * third;
         self.shift_px(product - excess / self.px_per_product)
+    }
+
+    /// Takes off q, given at whole steps either way of its middle, what the reference's own noise is in it: the same noise
+    /// is in h, and looks like texture. How much, the slope tells, which was made without it.
+    #[cfg(feature = "long-exposure")]
+    pub(crate) fn drop_own_noise(&self, q: &mut [f32], level: Level, stride: usize) {
+        let (middle, mut slope, mut of_noise) = (q.len() / 2, 0.0, 0.0);
+        for (k, f) in (1..).zip(SLOPE) {
+            let at = |at: usize| q.get(at).copied().unwrap_or(0.0);
+            slope += f * (at(middle + k) - at(middle.saturating_sub(k)));
+            of_noise += 2.0 * f * level.half_filter().get(k - 1).unwrap_or(&0.0);
+        }
+        let noise = (slope - stride as f32 / self.px_per_product) / of_noise;
+        // Neither is true of what is no number.
+        let plausible = noise > 0.0 && noise.is_finite();
+        let noise = if plausible { noise } else { 0.0 };
+        for (k, f) in (1..).zip(level.half_filter()) {
+            if let Some(right) = q.get_mut(middle + k) {
+                *right -= f * noise;
+            }
+            if let Some(left) = middle.checked_sub(k).and_then(|at| q.get_mut(at)) {
+                *left += f * noise;
+            }
+        }
     }
 
     /// −q‴/q' at rest, 1/px²: how fast the response falls off from there, k² for a texture of the one wave number k. 0

@@ -9,6 +9,9 @@
 //! phase-correlation function answers to them, its own polynomial tells
 //! ([`RowTable::shift_of_smeared_px`]). Left out, 4 px at 1 kHz with 0.2 ms of exposure get a third harmonic
 //! of 1 %.
+//!
+//! This is for boards. With the feature `long-exposure`, where lines need not be short, the whole path is taken
+//! (`path/`).
 
 use super::{
     Stage, Tracker,
@@ -129,6 +132,10 @@ impl Tracker<'_> {
         pixels: &[P],
         shift_px: f32,
     ) -> f32 {
+        #[cfg(feature = "long-exposure")]
+        if self.paths.are_of_use() {
+            return self.follow_path(row, table, pixels, shift_px);
+        }
         let information = table.information_per_px2();
         let motion = self.prediction.motion(row, shift_px, information);
         self.blur.add(motion.speed_px, motion.change_px);

@@ -19,6 +19,9 @@ pub struct RowLearning {
     pub(super) shift_px: f32,
     /// Frames that the reference is the mean of.
     pub(super) frames: u16,
+    /// Mean variance of the paths along which they were exposed, px²/1024.
+    #[cfg(feature = "long-exposure")]
+    smear: u16,
     /// Mean brightness of the lines against the reference.
     light: f32,
 }
@@ -43,11 +46,27 @@ impl RowLearning {
     pub(super) const EMPTY: Self = Self {
         shift_px: 0.0,
         frames: 0,
+        #[cfg(feature = "long-exposure")]
+        smear: 0,
         light: 0.0,
     };
 
     pub(super) fn frames(&self) -> u16 {
         self.frames.max(1)
+    }
+
+    /// The next frame's line was exposed along a path of this variance.
+    #[cfg(feature = "long-exposure")]
+    pub(super) fn add_smear(&mut self, px2: f32) {
+        let before = f32::from(self.smear) / 1024.0;
+        let mean = before + (px2 - before) / f32::from(self.frames.saturating_add(1));
+        self.smear = (mean * 1024.0 + 0.5) as u16;
+    }
+
+    /// Of the frames that the reference is the mean of, px²; `None` while there are none.
+    #[cfg(feature = "long-exposure")]
+    pub(super) fn smear_px2(&self) -> Option<f32> {
+        (self.frames > 0).then_some(f32::from(self.smear) / 1024.0)
     }
 }
 
@@ -82,6 +101,8 @@ impl Tracker<'_> {
         self.curvature = Curvature::default();
         self.near_px = NEAR_WHILE_LEARNING_PX * f32::from(self.config.stride);
         self.blur.relearn();
+        #[cfg(feature = "long-exposure")]
+        self.paths.relearn();
         self.meter = NoiseMeter::default();
         self.watch = Watch::default();
         self.follow = Follow::default();
@@ -111,6 +132,8 @@ impl Tracker<'_> {
                 for l in self.storage.learning.iter_mut() {
                     l.frames = 0;
                 }
+                #[cfg(feature = "long-exposure")]
+                self.paths.end_round(false);
                 self.stage = Stage::Refining;
             }
             Stage::Refining => {
@@ -118,12 +141,18 @@ impl Tracker<'_> {
                 self.settle_margin();
                 self.even_light();
                 self.build_all();
+                #[cfg(feature = "long-exposure")]
+                self.paths.end_round(true);
                 self.stage = Stage::Tracking;
                 self.near_px = NEAR_PX * f32::from(self.config.stride);
             }
             Stage::Tracking => {}
         }
         self.prediction.end_round(self.usual_information());
+        #[cfg(feature = "long-exposure")]
+        if self.paths.smear() {
+            self.prediction.expect_far();
+        }
         self.curvature = self.usual_curvature();
         self.blur.end_round();
         self.meter = NoiseMeter::default();
@@ -146,6 +175,10 @@ impl Tracker<'_> {
             }) if information_per_px2 > OWN_INFORMATION_PER_PX2 => {
                 textured = true;
                 self.prediction.note_extent(shift_px, information_per_px2);
+                #[cfg(feature = "long-exposure")]
+                if self.stage == Stage::Rough && self.paths.are_of_use() {
+                    self.note_oscillation(row, shift_px, information_per_px2);
+                }
                 shift_px
             }
             Ok(_) | Err(Left::NoTexture) => self.prediction.at(row),

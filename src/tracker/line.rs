@@ -366,6 +366,9 @@ impl Tracker<'_> {
         self.turn = self.turn_of(frame);
         self.prediction
             .begin_frame(start_ns, self.stage != Stage::Rough);
+        #[cfg(feature = "long-exposure")]
+        self.paths
+            .begin_frame(start_ns, self.stage == Stage::Refining);
         self.watch.begin_frame(frame);
         self.attend = 0;
         self.beside = self.follow.is_busy() || self.watch.is_searching();

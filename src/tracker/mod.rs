@@ -19,6 +19,8 @@ mod gap;
 mod learn;
 mod line;
 mod overlap;
+#[cfg(feature = "long-exposure")]
+mod path;
 mod predict;
 mod row;
 mod storage;
@@ -90,6 +92,8 @@ pub struct Tracker<'a> {
     to_reference: f32,
     flicker: Flicker,
     blur: Blur,
+    #[cfg(feature = "long-exposure")]
+    paths: path::Paths,
     meter: NoiseMeter,
     /// Largest shift met in this round, px.
     range_px: f32,
@@ -140,6 +144,12 @@ impl<'a> Tracker<'a> {
             to_reference: 1.0,
             flicker: Flicker::new(&config.timing),
             blur: Blur::new(&config.timing),
+            #[cfg(feature = "long-exposure")]
+            paths: path::Paths::new(
+                &config.timing,
+                config.stride,
+                config.columns_per_line != u16::MAX,
+            ),
             meter: NoiseMeter::default(),
             range_px: 0.0,
             watch: Watch::default(),

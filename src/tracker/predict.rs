@@ -180,7 +180,7 @@ impl Prediction {
 
     /// A row that knows so much less than others tells nothing of the next: some tens of them, noise of an even wall that
     /// was taken for texture, would lead anywhere.
-    fn is_lost_on(&self, information: f32) -> bool {
+    pub(super) fn is_lost_on(&self, information: f32) -> bool {
         information < Self::LEAST_SHARE * self.usual_information
     }
 
@@ -283,6 +283,12 @@ impl Prediction {
         (self.extent, self.extent_information) = (0.0, 0.0);
         self.usual_information = usual_information;
         self.shift_px = self.gap.expected_px();
+    }
+
+    /// The motion smears lines, however far it goes.
+    #[cfg(feature = "long-exposure")]
+    pub(super) fn expect_far(&mut self) {
+        self.far = true;
     }
 
     fn forget(&mut self) {

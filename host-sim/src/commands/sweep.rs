@@ -231,6 +231,7 @@ fn lines(options: &Lines) -> Result<(), Failure> {
     let (rows, frames) = if options.quick { (32, 12) } else { (96, 40) };
     let mut cases = case::small_motion(options.seed, rows, frames);
     cases.extend(case::hard(options.seed));
+    cases.extend(case::long_exposure(options.seed));
     cases.push(case::shaking(options.seed));
     let mut out = std::io::stdout().lock();
     let failed = |error| Failure::writing("standard output", &error);

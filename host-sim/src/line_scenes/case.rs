@@ -217,6 +217,30 @@ pub fn hard(seed: u64) -> Vec<Case> {
     cases
 }
 
+/// Exposed for so long that the picture moves by several pixels meanwhile. Left out is what an exposure of whole periods
+/// does not show.
+pub fn long_exposure(seed: u64) -> Vec<Case> {
+    let mut cases = Vec::new();
+    for exposure_ns in [200_000, 500_000, 1_000_000] {
+        let ms = f64::from(exposure_ns) / 1e6;
+        for hz in [103.0, 301.7, 463.0, 703.0, 1003.0] {
+            if f64::from(exposure_ns) * 1e-9 * hz > 0.9 {
+                continue;
+            }
+            for px in [1.6, 4.0] {
+                let name = format!("exposed {ms} ms: {px} px at {hz} Hz");
+                let mut case = usual(seed, &name, vec![tone(hz, px)], 1.0);
+                case.config.sensor.exposure_ns = exposure_ns;
+                // As they are by default: in 20 a tone near a multiple of the frame rate is hardly seen to move.
+                case.learn_frames = 30;
+                case.config.frames += 40;
+                cases.push(case);
+            }
+        }
+    }
+    cases
+}
+
 /// The camera shakes, and its 64 leftmost columns show a background that does not move with the machine.
 pub fn shaking(seed: u64) -> Case {
     let mut case = usual(seed, "shake 0.5 px, background", vec![tone(61.3, 0.2)], 1.0);
