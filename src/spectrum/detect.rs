@@ -72,12 +72,14 @@ pub(crate) struct Band {
     pub(crate) fps: Option<f32>,
 }
 
-/// The largest peaks of the residual, the largest first.
+/// The largest peaks of the residual that are not `barred`, the largest first. Below the band they are given too: they may
+/// have ghosts in it.
 pub(crate) fn candidates(
     samples: &mut Samples<'_>,
     model: &Model,
     grid: &mut [f32],
     band: Band,
+    barred: impl Fn(Candidate) -> bool,
 ) -> heapless::Vec<Candidate, CANDIDATES> {
     let mut found = heapless::Vec::new();
     let g = Grid::over(samples.length_s, band.highest_hz, grid.len());
@@ -92,7 +94,7 @@ pub(crate) fn candidates(
         return found;
     };
     let bin_hz = g.bin_hz();
-    let first = (libm::ceilf(band.lowest_hz / bin_hz) as usize).max(2);
+    let first = 1;
     let last = ((band.highest_hz / bin_hz) as usize).min(bins.len().saturating_sub(2));
     let scale = 2.0 / samples.total_weight;
     if first > last {
@@ -144,7 +146,9 @@ pub(crate) fn candidates(
             frequency: Frequency::from_hz(b as f32 * bin_hz).plus(shift * bin_hz),
             gain,
         };
-        insert(&mut found, candidate);
+        if !barred(candidate) {
+            insert(&mut found, candidate);
+        }
         if found.is_full() {
             too_low = found.last().map_or(0.0, |c| c.gain / most);
         }

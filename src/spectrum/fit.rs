@@ -10,6 +10,9 @@ use crate::report::MAX_PEAKS;
 /// Furthest a frequency may move in one step, turns a window length.
 const LONGEST_STEP: f32 = 0.3;
 
+/// A tone grows or dies away by no more than e to this power in a window.
+const MOST_GROWTH: f32 = 8.0;
+
 /// A step that lowers the sum of squares by less than this many noise variances is the last.
 const ENOUGH: f32 = 0.3;
 
@@ -189,7 +192,9 @@ impl Fit {
                     tone.frequency = tone.frequency.plus(turns / length_s);
                 }
                 Unknown::Chirp => tone.chirp += change.clamp(-1.0, 1.0),
-                Unknown::Growth => tone.growth = (tone.growth + change).clamp(-1.9, 1.9),
+                Unknown::Growth => {
+                    tone.growth = (tone.growth + change).clamp(-MOST_GROWTH, MOST_GROWTH);
+                }
             }
         }
     }

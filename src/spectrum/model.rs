@@ -17,7 +17,10 @@ pub(crate) const POWERS: usize = 3;
 /// A sample is skewed where its time is off its frame's and slot's by more than this many steps.
 pub(crate) const NO_SKEW: u16 = 16;
 
-/// One sinusoid: Re(conj(amplitude) · (1 + growth·t) · e^(2πi(f·t + chirp·t²/2))), t in window lengths.
+/// One sinusoid: Re(conj(amplitude) · e^(growth·t + 2πi(f·t + chirp·t²/2))), t in window lengths from the middle.
+///
+/// What was struck dies away so: a linear growth in place of e^(growth·t) leaves beside it what it does not follow, and
+/// where the blank time is long that has ghosts.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Tone {
     pub(crate) frequency: Frequency,
@@ -25,7 +28,7 @@ pub(crate) struct Tone {
     pub(crate) amplitude: Complex,
     /// Turns per window length squared.
     pub(crate) chirp: f32,
-    /// Relative change of amplitude over a window length.
+    /// Relative change of amplitude, 1 a window length.
     pub(crate) growth: f32,
     /// `chirp` and `growth` are fitted.
     pub(crate) modulated: bool,
@@ -42,10 +45,26 @@ impl Tone {
         }
     }
 
+    /// How much larger it is at `t`.
+    #[inline(never)]
+    fn grown(&self, t: f32) -> f32 {
+        exp(self.growth * t)
+    }
+
     /// Highest power of t among the regressors.
     pub(crate) fn top_power(&self) -> usize {
         if self.modulated { 2 } else { 1 }
     }
+}
+
+/// e^x to 0.3 % for |x| up to 4, in a few multiplications: it is asked of every sample.
+fn exp(x: f32) -> f32 {
+    let y = x * (1.0 / 16.0);
+    let mut power = 1.0 + y * (1.0 + y * (0.5 + y * (1.0 / 6.0)));
+    for _ in 0..4 {
+        power *= power;
+    }
+    power
 }
 
 /// Weighted inner products of the residual with t^p·e^(iωt), p from 0.
@@ -129,15 +148,23 @@ impl Samples<'_> {
                 phase = phase.wrapping_add(turns(0.5 * tone.chirp * t * t));
             }
             (*re, *im) = cos_sin(phase);
+            if tone.modulated {
+                let grown = tone.grown(t);
+                (*re, *im) = (grown * *re, grown * *im);
+            }
         }
         let s = self.slots;
         let rows = self.slot_re[k * s..]
             .iter_mut()
             .zip(self.slot_im[k * s..].iter_mut());
         let hz = tone.frequency.hz();
-        for ((re, im), (&ns, spread)) in rows.zip(self.slot_ns.iter().zip(self.spread).take(s)) {
+        let slots = self.slot_ns.iter().zip(self.slot_t.iter());
+        for ((re, im), ((&ns, &t), spread)) in rows.zip(slots.zip(self.spread).take(s)) {
             let (c, s) = cos_sin(tone.frequency.phase(ns));
-            let phasor = Complex::new(c, s) * blur(hz, spread, &self.even);
+            let mut phasor = Complex::new(c, s) * blur(hz, spread, &self.even);
+            if tone.modulated {
+                phasor = phasor.scale(tone.grown(t));
+            }
             (*re, *im) = (phasor.re, phasor.im);
         }
     }
@@ -163,7 +190,7 @@ impl Samples<'_> {
                 .phase(self.frame_ns[i].wrapping_add(ns))
                 .wrapping_add(turns(0.5 * tone.chirp * at * at));
             let (c, s) = cos_sin(phase);
-            let phasor = Complex::new(c, s) * blur;
+            let phasor = (Complex::new(c, s) * blur).scale(tone.grown(at));
             (self.own_re[i], self.own_im[i]) = (phasor.re, phasor.im);
             self.row_t[i] = at;
         }
@@ -207,8 +234,7 @@ impl Samples<'_> {
             self.own_phasors(tone, slot);
             let a = tone.amplitude;
             for i in 0..n {
-                let grown = 1.0 + tone.growth * self.row_t[i];
-                self.row[i] -= grown * (a.re * self.own_re[i] + a.im * self.own_im[i]);
+                self.row[i] -= a.re * self.own_re[i] + a.im * self.own_im[i];
             }
         }
         let weight = &self.weight[here];

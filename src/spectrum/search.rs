@@ -12,10 +12,16 @@ use super::phase::Frequency;
 const STEPS: u32 = 12;
 
 /// Tones nearer than this are one, turns a window length.
-const CLOSEST: f32 = 0.7;
+const CLOSEST: f32 = 0.5;
 
 /// Where the ghosts of a tone are, in frame rates from it.
 const GHOSTS: [f32; 4] = [1.0, -1.0, 2.0, -2.0];
+
+/// What is this near to a ghost's place is the ghost, turns a window length.
+const AS_GHOST: f32 = 1.0;
+
+/// What is no steady tone may have ghosts of so many times the power that a steady one's would have.
+const UNLIKE_A_TONE: f32 = 4.0;
 
 /// Power of a tone's ghosts over its own below which they are not tried in its place.
 const LOW_GHOST: f32 = 0.15;
@@ -49,6 +55,16 @@ const CHIRPS: [f32; 7] = [
     -MOST_CHIRP,
 ];
 
+/// Places at which nothing could be put that are remembered.
+const MOST_BARRED: usize = 8;
+
+/// Where the residual holds more than noise but no tone can be put: too near another, or slower than the window can tell.
+struct Barred {
+    places: heapless::Vec<Candidate, MOST_BARRED>,
+    /// Power that ghosts may have over that of where they come from.
+    ghost: f32,
+}
+
 /// How the search is to be done.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Search {
@@ -61,7 +77,7 @@ pub(crate) struct Search {
 /// What a search ended with.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Outcome {
-    /// A further tone was above the false-alarm level but there was no room for it.
+    /// A further tone was above the false-alarm level but there was no room for it, or too much is left that is no tone.
     pub(crate) more: bool,
 }
 
@@ -140,48 +156,118 @@ impl Search {
         if Fit::freedom(samples, model) < 6.0 {
             return false;
         }
-        let candidates = detect::candidates(samples, model, grid, self.band);
-        let Some(first) = candidates.first().copied() else {
-            return false;
-        };
         let share = self.threshold(samples, model);
-        if first.gain < 0.4 * share * model.squares {
-            return false;
+        let length_s = samples.length_s;
+        let mut barred = Barred {
+            places: heapless::Vec::new(),
+            ghost: UNLIKE_A_TONE * self.ghost(samples),
+        };
+        loop {
+            let candidates = detect::candidates(samples, model, grid, self.band, |candidate| {
+                self.is_barred(length_s, &barred, candidate)
+            });
+            let Some(first) = candidates.first().copied() else {
+                return false;
+            };
+            if first.gain < 0.4 * share * model.squares {
+                return false;
+            }
+            if model.tones.len() >= self.most_tones || self.tired(fit) {
+                outcome.more |= first.gain > share * model.squares;
+                return false;
+            }
+            let before = barred.places.len();
+            if let Some(best) = self.best(samples, fit, model, &candidates, &mut barred) {
+                if model.squares - best.squares <= share * best.squares {
+                    return false;
+                }
+                if model.squares - best.squares < 2.0 * share * best.squares {
+                    // Tones near each other are slow to settle: what they gain by it is not the new one's.
+                    fit.refine(samples, model, STEPS);
+                    if model.squares - best.squares <= share * best.squares {
+                        return false;
+                    }
+                }
+                let newest = best.tones.last().map(|t| t.frequency);
+                *model = match newest.and_then(|at| self.modulate(samples, fit, model, &best, at)) {
+                    Some(modulated) if modulated.squares < best.squares => modulated,
+                    _ => best,
+                };
+                return true;
+            }
+            // What no further tone explains may come of one's changing.
+            if before == 0
+                && let Some(changing) = self.modulate(samples, fit, model, model, first.frequency)
+                && model.squares - changing.squares > share * changing.squares
+            {
+                *model = changing;
+                return true;
+            }
+            if barred.places.is_full() {
+                outcome.more = true;
+                return false;
+            }
         }
-        if model.tones.len() >= self.most_tones || self.tired(fit) {
-            outcome.more |= first.gain > share * model.squares;
-            return false;
-        }
+    }
+
+    /// The candidate that explains most, as a further tone. Those that cannot be put anywhere are barred.
+    fn best(
+        &self,
+        samples: &mut Samples<'_>,
+        fit: &mut Fit,
+        model: &Model,
+        candidates: &[Candidate],
+        barred: &mut Barred,
+    ) -> Option<Model> {
+        let first = candidates.first()?;
         let mut best: Option<Model> = None;
-        for candidate in &candidates {
+        for candidate in candidates {
             // Rivals of the first are its ghosts, or it is theirs; others only count where these come to nothing.
             let rival =
-                candidate.gain > 0.5 * first.gain && self.ghostly(samples, first, *candidate);
-            if best.is_some() && !rival {
+                candidate.gain > 0.5 * first.gain && self.ghostly(samples, *first, *candidate);
+            if (best.is_some() && !rival) || self.is_barred(samples.length_s, barred, *candidate) {
                 continue;
             }
+            let mut put = false;
             for start in self.starts(samples, candidate.frequency) {
                 if self.tired(fit) {
-                    break;
+                    return best;
                 }
                 let trial = self.try_tone(samples, fit, model, start);
+                put |= trial.is_some();
                 if let Some(trial) = trial
                     && best.as_ref().is_none_or(|b| trial.squares < b.squares)
                 {
                     best = Some(trial);
                 }
             }
-        }
-        match best {
-            Some(best) if model.squares - best.squares > share * best.squares => {
-                *model = match self.modulate(samples, fit, model, &best) {
-                    Some(modulated) if modulated.squares < best.squares => modulated,
-                    _ => best,
-                };
-                true
+            if !put && best.is_none() {
+                let _ = barred.places.push(*candidate);
             }
-            _ => false,
         }
+        best
+    }
+
+    /// Nothing can be put at this place, or it is no more than a ghost of what is at such a place: a multiple of the frame
+    /// rate from it or from its mirror image.
+    fn is_barred(&self, length_s: f32, barred: &Barred, candidate: Candidate) -> bool {
+        let at = candidate.frequency;
+        barred.places.iter().any(|place| {
+            let apart = [at.above(place.frequency), at.hz() + place.frequency.hz()];
+            apart.iter().any(|apart| {
+                let k = self.band.fps.map_or(0.0, |fps| libm::roundf(apart / fps));
+                let away = apart - k * self.band.fps.unwrap_or(0.0);
+                let low = k == 0.0 || candidate.gain < barred.ghost * place.gain;
+                low && away.abs() * length_s < AS_GHOST
+            })
+        })
+    }
+
+    /// Power of a steady tone's largest ghosts over its own; 0 where the window has no single frame rate.
+    fn ghost(&self, samples: &Samples<'_>) -> f32 {
+        self.band
+            .fps
+            .map_or(0.0, |fps| samples.ghost(fps).max(samples.ghost(2.0 * fps)))
     }
 
     /// Two candidates lie a multiple of the frame rate apart.
@@ -230,25 +316,28 @@ impl Search {
         self.sound(samples, &trial).then_some(trial)
     }
 
-    /// A tone that changes within the window has others beside it in a steady model. Where the newest tone of `with` is
-    /// near a larger one, gives `model` with that one's frequency and amplitude changing instead.
+    /// A tone that changes within the window has others beside it in a steady model. Where what is `beside` is near a
+    /// larger tone, gives `model` with that one's frequency and amplitude changing instead. `with` is the model with a
+    /// further tone there, or without, where none could be put.
     fn modulate(
         &self,
         samples: &mut Samples<'_>,
         fit: &mut Fit,
         model: &Model,
         with: &Model,
+        beside: Frequency,
     ) -> Option<Model> {
-        let newest = with.tones.last()?;
-        let near = |tone: &Tone| newest.frequency.above(tone.frequency) * samples.length_s;
+        let near = |tone: &Tone| beside.above(tone.frequency) * samples.length_s;
         let i = model.tones.iter().position(|t| near(t).abs() < BESIDE)?;
-        let (a, b) = (with.tones.get(i)?, newest);
-        let (pa, pb) = (a.amplitude.norm_sqr(), b.amplitude.norm_sqr());
+        let a = with.tones.get(i)?;
+        let further = with.tones.get(model.tones.len());
+        let pa = a.amplitude.norm_sqr();
+        let pb = further.map_or(0.0, |b| b.amplitude.norm_sqr());
         let center = model
             .tones
             .get(i)?
             .frequency
-            .plus(pb / (pa + pb) * b.frequency.above(a.frequency));
+            .plus(pb / (pa + pb) * beside.above(a.frequency));
         let length_s = samples.length_s;
         let mut best: Option<Model> = None;
         for chirp in CHIRPS {
@@ -275,7 +364,8 @@ impl Search {
             if sound && best.as_ref().is_none_or(|b| trial.squares < b.squares) {
                 best = Some(trial);
             }
-            if best.as_ref().is_some_and(|b| b.squares < with.squares) {
+            let enough = best.as_ref().is_some_and(|b| b.squares < with.squares);
+            if enough || further.is_none() {
                 break;
             }
         }
@@ -293,7 +383,9 @@ impl Search {
                 .take(i)
                 .all(|other| tone.frequency.above(other.frequency).abs() * length_s > CLOSEST);
             let within = hz > 0.5 * self.band.lowest_hz && hz < 1.02 * self.band.highest_hz;
-            apart && within && samples.kept(&samples.frame_means(i + 1)) > LEAST_KEPT
+            apart
+                && within
+                && (tone.modulated || samples.kept(&samples.frame_means(i + 1)) > LEAST_KEPT)
         })
     }
 
@@ -303,7 +395,7 @@ impl Search {
             return false;
         };
         // With little blank time ghosts are too low to be taken for the tone, even two at one place.
-        if samples.ghost(fps).max(samples.ghost(2.0 * fps)) < LOW_GHOST {
+        if self.ghost(samples) < LOW_GHOST {
             return false;
         }
         let mut changed = false;

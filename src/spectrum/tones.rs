@@ -85,7 +85,8 @@ impl Telling<'_> {
             }
             let amplitude = crate::kernel::sqrtf(tone.amplitude.norm_sqr());
             let unit = fit.deviation(&regressors, model, i, samples.length_s);
-            let kept = samples.kept(&samples.frame_means(i + 1));
+            // One that changes is no standing deformation, wherever it is.
+            let kept = tone.modulated || samples.kept(&samples.frame_means(i + 1)) >= KEPT_ENOUGH;
             let power = samples.total_weight * amplitude * amplitude / (4.0 * variance).max(1e-30);
             let amplitude_px = amplitude / attenuation;
             let sd_px = noise * unit.amplitude_px / attenuation;
@@ -97,7 +98,7 @@ impl Telling<'_> {
                 amplitude_px: amplitude_px * smeared.scale,
                 amplitude_px_sd: crate::kernel::sqrtf(sd_px * sd_px + doubt_px * doubt_px),
                 snr_db: 10.0 * libm::log10f(power.max(1e-9)),
-                ambiguous: self.near_multiple(hz, samples.length_s) || kept < KEPT_ENOUGH,
+                ambiguous: self.near_multiple(hz, samples.length_s) || !kept,
                 track: 0,
                 harmonic: None,
             };

@@ -133,7 +133,7 @@ struct Spectrum {
     /// Which series of scenes
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Also lists the scenes in which a tone was missed or invented
+    /// Also lists the scenes in which a tone was missed, invented or more than 4 bounds off
     #[arg(long)]
     failures: bool,
 }
@@ -153,7 +153,7 @@ struct Cameras {
     /// Which series of recordings
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Also lists the recordings in which a tone was missed or invented
+    /// Also lists the recordings in which a tone was missed, invented or more than 4 bounds off
     #[arg(long)]
     failures: bool,
 }

@@ -7,6 +7,9 @@ use rowtone::spectrum::Config;
 use super::scene::{Ranges, Scene, TrueTone, Truth};
 use crate::memory::SpectrumMemory;
 
+/// A tone whose frequency or amplitude is so many bounds off has gone wrong.
+const FAR_OFF: f64 = 4.0;
+
 /// Counts and errors of many scenes.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Score {
@@ -44,13 +47,18 @@ impl Score {
     /// Adds the report of scene `number`.
     pub fn add(&mut self, number: u64, scene: &Truth, report: &Report) {
         let (found, strays) = (self.found, self.false_peaks);
-        self.count(scene, report);
-        if self.found - found < scene.tones.len() || self.false_peaks > strays {
-            self.failures.push(describe(number, scene, report));
+        let furthest = self.count(scene, report);
+        let missed = self.found - found < scene.tones.len();
+        if missed || self.false_peaks > strays || furthest > FAR_OFF {
+            let what = describe(number, scene, report);
+            self.failures
+                .push(format!("{what}; at most {furthest:.1} bounds off"));
         }
     }
 
-    fn count(&mut self, scene: &Truth, report: &Report) {
+    /// Gives how far off the tones are at most, in bounds.
+    fn count(&mut self, scene: &Truth, report: &Report) -> f64 {
+        let mut furthest: f64 = 0.0;
         self.scenes += 1;
         self.tones += scene.tones.len();
         let reach = 0.5 / scene.window_s;
@@ -72,6 +80,8 @@ impl Score {
             self.amplitude_over_bound += (amplitude / tone.amplitude_bound_px).powi(2);
             self.hz_over_sd += (hz / f64::from(peak.hz_sd)).powi(2);
             self.amplitude_over_sd += (amplitude / f64::from(peak.amplitude_px_sd)).powi(2);
+            let off = [hz / tone.hz_bound, amplitude / tone.amplitude_bound_px];
+            furthest = furthest.max(off[0].abs()).max(off[1].abs());
         }
         let strays: Vec<f64> = report
             .peaks
@@ -89,6 +99,7 @@ impl Score {
             });
             self.ghosts += usize::from(ghost);
         }
+        furthest
     }
 
     /// Share of the tones found.
