@@ -15,7 +15,13 @@ fn small() -> Vec<Case> {
 
 /// Large and fast motion, and a hand, on half of the picture's columns and 0.4 s.
 fn large() -> Vec<Case> {
-    let wanted = ["1003 Hz +", "50.3 Hz, stripes", "30 px", "hand"];
+    let wanted = [
+        "1003 Hz +",
+        "50.3 Hz, stripes",
+        "12 px stripes",
+        "30 px",
+        "hand",
+    ];
     let mut cases = hard(11);
     cases.retain(|c| wanted.iter().any(|wanted| c.name.contains(wanted)));
     for case in &mut cases {

@@ -369,6 +369,8 @@ impl Tracker<'_> {
         #[cfg(feature = "long-exposure")]
         self.paths
             .begin_frame(start_ns, self.stage == Stage::Refining);
+        #[cfg(feature = "long-exposure")]
+        self.look_ahead();
         self.watch.begin_frame(frame);
         self.attend = 0;
         self.beside = self.follow.is_busy() || self.watch.is_searching();

@@ -285,6 +285,14 @@ impl Prediction {
         self.shift_px = self.gap.expected_px();
     }
 
+    /// A swift picture will be here in the first row.
+    #[cfg(feature = "long-exposure")]
+    pub(super) fn foresee(&mut self, shift_px: f32) {
+        if self.swift_frames > 0 {
+            self.shift_px = shift_px;
+        }
+    }
+
     /// The motion smears lines, however far it goes.
     #[cfg(feature = "long-exposure")]
     pub(super) fn expect_far(&mut self) {

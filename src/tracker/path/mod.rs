@@ -10,10 +10,12 @@
 //! shifts, at which q is an inner product each: some microseconds a line of a desktop, and only where the motion is swift.
 //! A tracker whose lines must be short ([`Config::columns_per_line`](super::Config::columns_per_line)) does without.
 
+mod ahead;
 mod oscillation;
 mod response;
 
 use crate::camera::Timing;
+use ahead::Ahead;
 use oscillation::{Basis, Oscillation};
 
 /// Points of a path.
@@ -55,6 +57,7 @@ pub(super) struct Paths {
     stride: u8,
     start_ns: i64,
     oscillation: Oscillation,
+    ahead: Ahead,
     /// The path at each of its points, for a speed and an acceleration of 1, in px; all 0 where none is known.
     points: [[f32; 2]; SAMPLES],
     /// Where pictures were along the paths that the reference was learned from.
@@ -83,7 +86,8 @@ impl Paths {
             line_ns,
             stride,
             start_ns: 0,
-            oscillation: Oscillation::new(exposure_rows),
+            oscillation: Oscillation::new(exposure_rows, exposure_rows.clamp(8.0, 64.0)),
+            ahead: Ahead::default(),
             points: [[0.0; 2]; SAMPLES],
             histogram: [0.0; BINS],
             sharpen: [[0.0; SHARPEN + 1]; 3],
@@ -95,7 +99,8 @@ impl Paths {
 
     pub(super) fn relearn(&mut self) {
         *self = Self {
-            oscillation: Oscillation::new(self.exposure_rows),
+            oscillation: Oscillation::new(self.exposure_rows, self.exposure_rows.clamp(8.0, 64.0)),
+            ahead: Ahead::default(),
             points: [[0.0; 2]; SAMPLES],
             histogram: [0.0; BINS],
             sharpen: [[0.0; SHARPEN + 1]; 3],
@@ -121,7 +126,9 @@ impl Paths {
         }
         let since = start_ns.saturating_sub(self.start_ns) as f32 / self.line_ns;
         self.start_ns = start_ns;
-        self.oscillation.begin_frame(libm::roundf(since));
+        let since = libm::roundf(since);
+        self.oscillation.begin_frame(since);
+        self.ahead.begin_frame(since, &self.oscillation);
         self.frames = (self.frames + 1.0).min(Self::MEMORY_FRAMES);
         self.settle_points();
         if refining {
@@ -134,6 +141,7 @@ impl Paths {
 
     /// Ends a round of learning; the next one's frames are counted anew.
     pub(super) fn end_round(&mut self, refined: bool) {
+        self.ahead = Ahead::default();
         if refined {
             self.settle_sharpening(true);
         } else {

@@ -11,6 +11,14 @@ use crate::kernel::sqrtf;
 const RING: usize = 32;
 const MOST_LAG: u8 = 15;
 
+/// Further apart, two rows are not of one motion, px.
+const JUMP_PX: f32 = 3.0;
+
+/// Where a row is kept; those of a run are whole numbers from 0 on.
+fn ring(row: f32) -> usize {
+    row as i32 as usize % RING
+}
+
 /// sin ωτ/ω and (1 − cos ωτ)/ω² of a time τ, and cos ωτ.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Basis {
@@ -39,28 +47,82 @@ impl Basis {
     }
 }
 
-/// Fading means of the frequency's regression.
+/// The frequency's regression: sums of the present frame, and fading ones of those before, each about its frame's own mean.
+/// Frames may have been read at different stripes of a periodic texture.
 #[derive(Clone, Copy, Debug, Default)]
 struct Regression {
+    /// Fading mean and mean square of all rows.
+    n: f32,
+    x: f32,
+    xx: f32,
+    frame: Sums,
+    before: Moments,
+}
+
+/// Sums of one frame; x is taken from its first row on, so that single precision is enough.
+#[derive(Clone, Copy, Debug, Default)]
+struct Sums {
+    first: f32,
     n: f32,
     x: f32,
     z: f32,
+    xx: f32,
+    xz: f32,
+    noise: f32,
+}
+
+/// Rows, Σ x² and −Σ xz.
+#[derive(Clone, Copy, Debug, Default)]
+struct Moments {
+    n: f32,
     xx: f32,
     xz: f32,
 }
 
 impl Regression {
     const MEMORY: f32 = 8192.0;
-    /// Fewer rows tell nothing.
-    const LEAST: f32 = 256.0;
+    /// Fewer rows tell nothing, of all and in a frame.
+    const LEAST: f32 = 192.0;
+    const LEAST_IN_FRAME: f32 = 16.0;
 
-    fn add(&mut self, x: f32, z: f32) {
+    /// `noise`: variance of a row.
+    fn add(&mut self, x: f32, z: f32, noise: f32) {
         self.n = (self.n + 1.0).min(Self::MEMORY);
         let share = 1.0 / self.n;
         self.x += (x - self.x) * share;
-        self.z += (z - self.z) * share;
         self.xx += (x * x - self.xx) * share;
-        self.xz += (x * z - self.xz) * share;
+        let frame = &mut self.frame;
+        if frame.n == 0.0 {
+            frame.first = x;
+        }
+        let x = x - frame.first;
+        frame.n += 1.0;
+        frame.x += x;
+        frame.z += z;
+        frame.xx += x * x;
+        frame.xz += x * z;
+        frame.noise += noise;
+    }
+
+    fn end_frame(&mut self) {
+        let Sums {
+            n,
+            x,
+            z,
+            xx,
+            xz,
+            noise,
+            ..
+        } = core::mem::take(&mut self.frame);
+        if n < Self::LEAST_IN_FRAME {
+            return;
+        }
+        let before = &mut self.before;
+        let keep = (1.0 - n / Self::MEMORY).max(0.0);
+        before.n = before.n * keep + n;
+        // The noise of x is twice in z, with the other sign.
+        before.xx = before.xx * keep + (xx - x * x / n - noise).max(0.0);
+        before.xz = before.xz * keep + (x * z / n - xz - 2.0 * noise);
     }
 
     fn variance(&self) -> f32 {
@@ -69,8 +131,9 @@ impl Regression {
 
     /// 4·sin²(ωB/2); `None` while it is not known.
     fn bend(&self) -> Option<f32> {
-        let bend = -(self.xz - self.x * self.z) / self.variance();
-        (self.n >= Self::LEAST && bend.is_finite()).then_some(bend.clamp(0.0, 4.0))
+        let Moments { n, xx, xz } = self.before;
+        let bend = xz / xx;
+        (n >= Self::LEAST && bend.is_finite()).then_some(bend.clamp(0.0, 4.0))
     }
 }
 
@@ -93,11 +156,11 @@ pub(super) struct Oscillation {
 }
 
 impl Oscillation {
-    /// For lines that are exposed for so many rows.
-    pub(super) fn new(exposure_rows: f32) -> Self {
+    /// For lines that are exposed for so many rows, with a memory of so many.
+    pub(super) fn new(exposure_rows: f32, memory_rows: f32) -> Self {
         Self {
             lag: ((0.25 * exposure_rows) as u8).clamp(2, MOST_LAG),
-            keep: 1.0 - 1.0 / exposure_rows.clamp(8.0, 64.0),
+            keep: 1.0 - 1.0 / memory_rows,
             regression: Regression::default(),
             recent: [0.0; RING],
             run: 0,
@@ -122,6 +185,7 @@ impl Oscillation {
     pub(super) fn begin_frame(&mut self, rows: f32) {
         self.row -= rows;
         self.run = 0;
+        self.regression.end_frame();
         if let Some(bend) = self.regression.bend() {
             self.omega = 2.0 / f32::from(self.lag) * libm::asinf(0.5 * sqrtf(bend));
         }
@@ -136,6 +200,26 @@ impl Oscillation {
     /// Mean square of the motion about its middle, px².
     pub(super) fn power_px2(&self) -> f32 {
         self.regression.variance()
+    }
+
+    /// A frame begins so many rows after the last one did; the frequency is as another knows it.
+    pub(super) fn begin_frame_like(&mut self, rows: f32, other: &Self) {
+        self.row -= rows;
+        self.omega = other.omega;
+        self.one_row = other.one_row;
+        self.regression = other.regression;
+    }
+
+    /// Where the picture will be in the first row of this frame, px; `None` where the frequency is not known, or the rows
+    /// before are long ago.
+    pub(super) fn foresee(&self) -> Option<f32> {
+        const MOST_ROWS: f32 = 4096.0;
+        let rows = -self.row;
+        let soon = rows > 0.0 && rows < MOST_ROWS;
+        let Basis { speed, change, .. } = Basis::new(self.omega, rows);
+        let [px, v, a] = self.state;
+        let px = px + v * speed + a * change;
+        (soon && px.is_finite()).then_some(px)
     }
 
     /// What the rows before say of this one.
@@ -176,7 +260,8 @@ impl Oscillation {
         }
         // Neither is true of what is no number.
         let [[a, _, _], [_, e, _], [_, _, i]] = self.variance;
-        let known = a < most && a.min(e).min(i) > 0.0 && self.state[0] * self.state[0] < 4.0 * most;
+        let away = self.state[0] - self.regression.x;
+        let known = a < most && a.min(e).min(i) > 0.0 && away * away < 4.0 * most;
         if !known {
             self.state = [self.regression.x, 0.0, 0.0];
             self.variance = Self::unknown(most, omega2);
@@ -186,7 +271,8 @@ impl Oscillation {
 
     /// Takes a row's place.
     pub(super) fn add(&mut self, row: f32, px: f32, information: f32, of_frequency: bool) {
-        let follows = row == self.row + 1.0;
+        let before = self.recent[ring(self.row)];
+        let follows = row == self.row + 1.0 && (px - before).abs() < JUMP_PX;
         self.go_to(row);
         let own = 1.0 / information;
         let [[a, b, c], _, _] = self.variance;
@@ -214,11 +300,11 @@ impl Oscillation {
         } else {
             1
         };
-        let at = |before: u8| (row as i32 as usize).wrapping_sub(usize::from(before)) % RING;
+        let at = |before: u8| ring(row - f32::from(before));
         self.recent[at(0)] = px;
         if self.run > 2 * self.lag {
             let [x, before] = [self.lag, 2 * self.lag].map(|k| self.recent[at(k)]);
-            self.regression.add(x, px + before - 2.0 * x);
+            self.regression.add(x, px + before - 2.0 * x, own);
         }
     }
 
@@ -243,7 +329,7 @@ mod tests {
     fn a_tone_is_followed_over_frames_and_gaps() {
         // 4 px at 463 Hz with 33.67 µs a row, 300 rows and a gap of 195.
         let omega = core::f32::consts::TAU * 463.0 * 33.67e-6;
-        let mut oscillation = Oscillation::new(29.7);
+        let mut oscillation = Oscillation::new(29.7, 29.7);
         let mut noise = 1u32;
         let (mut worst, mut worst_at_first) = (0.0f32, 0.0f32);
         for frame in 0..20u16 {
@@ -273,7 +359,7 @@ mod tests {
 
     #[test]
     fn what_is_no_number_is_forgotten() {
-        let mut oscillation = Oscillation::new(10.0);
+        let mut oscillation = Oscillation::new(10.0, 10.0);
         oscillation.begin_frame(f32::INFINITY);
         oscillation.add(3.0, f32::NAN, 100.0, false);
         oscillation.begin_frame(100.0);

@@ -6,7 +6,7 @@ use crate::{
     pixel::Pixel,
     reference::RowTable,
     tracker::{
-        Stage, Tracker,
+        RowLearning, Stage, Tracker,
         correlate::part,
         overlap::{Overlap, nearest_step},
     },
@@ -73,9 +73,8 @@ impl Tracker<'_> {
         let at = row as u16 as f32;
         let refining = self.stage == Stage::Refining;
         let frames = self.paths.frames;
-        // The mean of the motion in the frames that the row was learned from is in all its shifts: the next frames tell.
-        let own_px = self.storage.learning.get(row).map_or(0.0, |l| l.shift_px);
-        let own_px = own_px * (frames - 1.0) / (frames - 1.0 + self.paths.learned);
+        let learning = self.storage.learning.get(row);
+        let own_px = learning.map_or(0.0, |l| self.own_px(l));
         let motion = self
             .paths
             .oscillation
@@ -104,9 +103,29 @@ impl Tracker<'_> {
     /// A row tells of the motion.
     pub(in crate::tracker) fn note_oscillation(&mut self, row: usize, px: f32, information: f32) {
         let sure = !self.prediction.is_lost_on(information);
-        self.paths
-            .oscillation
-            .add(row as u16 as f32, px, information, sure);
+        let row = row as u16 as f32;
+        self.paths.oscillation.add(row, px, information, sure);
+        if sure {
+            self.paths.ahead.add(row, px, information);
+        }
+    }
+
+    /// A frame begins; where a swift picture will be, the rows of the one before tell.
+    pub(in crate::tracker) fn look_ahead(&mut self) {
+        if let (true, Some(px)) = (self.stage != Stage::Rough, self.paths.ahead.foreseen_px()) {
+            let own_px = self
+                .storage
+                .learning
+                .first()
+                .map_or(0.0, |l| self.own_px(l));
+            self.prediction.foresee(px + own_px);
+        }
+    }
+
+    /// The mean of the motion in the frames that a row was learned from is in all its shifts, px: the next frames tell.
+    fn own_px(&self, row: &RowLearning) -> f32 {
+        let before = self.paths.frames - 1.0;
+        row.shift_px * before / (before + self.paths.learned)
     }
 
     fn correlate_along<P: Pixel>(
