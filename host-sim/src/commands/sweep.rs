@@ -77,8 +77,9 @@ struct Region {
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Columns: recordings in which all that was told is right (within 4 stated standard deviations), in which
-nothing was told, and in which something was wrong; rms of the line time's relative error, of its stated
-deviation, and of their ratio, with its 95 % range; the first reason of each kind.
+nothing was told, and in which something was wrong; rms of the line time's relative error and of its stated
+deviation; rms of error over stated deviation of each figure that was told, which should be 1, with the range
+that so many recordings leave open (95 %); the first reason of each kind.
 
 Example:
   rowtone sweep calibration --seeds 40 --only frame")]

@@ -14,6 +14,10 @@ use condition::{Condition, Source};
 /// Further than so many stated standard deviations is wrong. Chance does that once in 16 000 times.
 const FURTHEST: f64 = 4.0;
 
+/// What is judged, in the order of the table's columns. The read-out is so many line times: what is right of one is
+/// right of the other.
+pub const FIGURES: [&str; 4] = ["line time", "frame period", "blank time", "exposure"];
+
 /// What became of one recording.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Outcome {
@@ -23,6 +27,8 @@ pub enum Outcome {
         error: f64,
         /// Its stated standard deviation.
         sd: f64,
+        /// Error over stated standard deviation of each of [`FIGURES`] that was told.
+        off: [Option<f64>; FIGURES.len()],
     },
     /// Nothing was told, and why.
     Refused(String),
@@ -123,44 +129,37 @@ fn judge(condition: &Condition, found: &Calibration) -> Outcome {
     }
     let period_s = 1.0 / sensor.fps;
     let one_rate = condition.config.rate_changes.is_empty();
-    for (name, value, sd, truth) in [
-        (
-            "line time",
-            Some(found.line_time_s),
-            Some(found.line_time_s_sd),
-            line_time_s,
-        ),
-        (
-            "frame period",
-            found.frame_period_s.filter(|_| one_rate),
-            found.frame_period_s_sd,
-            period_s,
-        ),
-        (
-            "blank time",
-            found.blank_s.filter(|_| one_rate),
-            found.blank_s_sd,
-            period_s - line_time_s * f64::from(sensor.rows),
-        ),
-        (
-            "exposure",
-            found.exposure_s,
-            found.exposure_s_sd,
-            f64::from(sensor.exposure_ns) * 1e-9,
-        ),
-    ] {
-        if let (Some(value), Some(sd)) = (value, sd) {
-            let off = (value - truth) / sd;
-            // The simulator keeps its frames' starts in whole nanoseconds.
-            let rounding = if name == "frame period" { 1e-9 } else { 0.0 };
-            if off.abs() > FURTHEST && (value - truth).abs() > rounding {
-                return Outcome::Wrong(format!("{name} off by {off:+.1} standard deviations"));
+    let told = [
+        (Some(found.line_time_s), Some(found.line_time_s_sd)),
+        (found.frame_period_s, found.frame_period_s_sd),
+        (found.blank_s, found.blank_s_sd),
+        (found.exposure_s, found.exposure_s_sd),
+    ];
+    let truth = [
+        Some(line_time_s),
+        one_rate.then_some(period_s),
+        one_rate.then_some(period_s - line_time_s * f64::from(sensor.rows)),
+        Some(f64::from(sensor.exposure_ns) * 1e-9),
+    ];
+    let mut off = [None; FIGURES.len()];
+    for (k, ((value, sd), truth)) in told.into_iter().zip(truth).enumerate() {
+        if let (Some(value), Some(sd), Some(truth)) = (value, sd, truth) {
+            // The simulator keeps its frames' starts in whole nanoseconds: so the mean period of its recording differs.
+            let rounding = match k {
+                1 | 2 => 0.5e-9 / f64::from(condition.config.frames.max(2) - 1),
+                _ => 0.0,
+            };
+            let by = (value - truth) / sd.hypot(rounding);
+            if by.abs() > FURTHEST {
+                return Outcome::Wrong(format!("{} off by {by:+.1} standard deviations", FIGURES[k]));
             }
+            off[k] = Some(by);
         }
     }
     Outcome::Right {
         error: found.line_time_s / line_time_s - 1.0,
         sd: found.line_time_s_sd / line_time_s,
+        off,
     }
 }
 
@@ -169,8 +168,10 @@ fn judge(condition: &Condition, found: &Calibration) -> Outcome {
 pub struct Tally {
     /// Right, refused, wrong.
     pub counts: [u64; 3],
-    /// Sums of error², sd² and (error / sd)² over the right ones.
-    sums: [f64; 3],
+    /// Sums of the line time's error² and sd² over the right ones.
+    sums: [f64; 2],
+    /// Of each of [`FIGURES`]: how often it was told, and the sum of (error / sd)².
+    off: [(u64, f64); FIGURES.len()],
     /// The first reason of each kind.
     pub reasons: Vec<String>,
 }
@@ -184,10 +185,14 @@ impl Tally {
         let mut tally = Self::default();
         for seed in first..first + seeds {
             match run(condition, seed)? {
-                Outcome::Right { error, sd } => {
+                Outcome::Right { error, sd, off } => {
                     tally.counts[0] += 1;
-                    for (sum, value) in tally.sums.iter_mut().zip([error, sd, error / sd]) {
+                    for (sum, value) in tally.sums.iter_mut().zip([error, sd]) {
                         *sum += value * value;
+                    }
+                    for ((count, sum), by) in tally.off.iter_mut().zip(off) {
+                        *count += u64::from(by.is_some());
+                        *sum += by.unwrap_or(0.0).powi(2);
                     }
                 }
                 Outcome::Refused(why) => tally.count(1, "refused", &why),
@@ -205,28 +210,31 @@ impl Tally {
         self.counts[kind] += 1;
     }
 
-    /// Where the ratio's true rms lies with 95 %, were errors Gaussian: chi square by Wilson and Hilferty 1931.
-    fn ratio_range(&self) -> [f64; 2] {
-        let n = self.counts[0] as f64;
-        let [_, _, ratio] = self.rms();
-        let quantile = |z: f64| (1.0 - 2.0 / (9.0 * n) + z * (2.0 / (9.0 * n)).sqrt()).powi(3);
-        [1.96, -1.96].map(|z| match quantile(z) {
-            q if q > 0.0 => ratio / q.sqrt(),
-            _ => f64::INFINITY,
-        })
-    }
-
-    /// Rms of the relative error, of the stated standard deviation, and of their ratio.
-    pub fn rms(&self) -> [f64; 3] {
+    /// Rms of the line time's relative error and of its stated standard deviation.
+    pub fn rms(&self) -> [f64; 2] {
         self.sums
             .map(|sum| (sum / (self.counts[0] as f64).max(1.0)).sqrt())
+    }
+
+    /// Rms of error over stated standard deviation of one of [`FIGURES`], and where its true value lies with 95 %, were
+    /// errors Gaussian: chi square by Wilson and Hilferty 1931. `None` where it was never told.
+    pub fn ratio(&self, figure: usize) -> Option<(f64, [f64; 2])> {
+        let (count, sum) = self.off[figure];
+        let n = count as f64;
+        let ratio = (sum / n.max(1.0)).sqrt();
+        let quantile = |z: f64| (1.0 - 2.0 / (9.0 * n) + z * (2.0 / (9.0 * n)).sqrt()).powi(3);
+        let range = [1.96, -1.96].map(|z| match quantile(z) {
+            q if q > 0.0 => ratio / q.sqrt(),
+            _ => f64::INFINITY,
+        });
+        (count > 0).then_some((ratio, range))
     }
 }
 
 /// Head of the table, as Markdown.
 pub const HEAD: &str = "\
-| condition | right | refused | wrong | rms error (relative) | stated sd | error / sd (rms) | 95 % | why |
-| :-- | --: | --: | --: | --: | --: | --: | --: | :-- |";
+| condition | right | refused | wrong | rms error (relative) | stated sd | line time, read-out | frame period | blank time | exposure | why |
+| :-- | --: | --: | --: | --: | --: | --: | --: | --: | --: | :-- |";
 
 /// One line of the table.
 ///
@@ -238,14 +246,18 @@ pub fn row(condition: &Condition, first: u64, seeds: u64) -> Result<String, SimE
     let mut text = format!("| {} | {right} | {refused} | {wrong} |", condition.name);
     // Writing to a string cannot fail.
     if right > 0 {
-        let [error, sd, ratio] = tally.rms();
-        let [least, most] = tally.ratio_range();
-        let _ = write!(
-            text,
-            " {error:.1e} | {sd:.1e} | {ratio:.2} | {least:.2}–{most:.2} |"
-        );
+        let [error, sd] = tally.rms();
+        let _ = write!(text, " {error:.1e} | {sd:.1e} |");
     } else {
-        text.push_str(" | | | |");
+        text.push_str(" | |");
+    }
+    for figure in 0..FIGURES.len() {
+        let _ = match tally.ratio(figure) {
+            Some((ratio, [least, most])) => {
+                write!(text, " {ratio:.2} ({least:.2}–{most:.2}) |")
+            }
+            None => write!(text, " |"),
+        };
     }
     let _ = write!(text, " {} |", tally.reasons.join("; "));
     Ok(text)
@@ -259,11 +271,11 @@ mod tests {
     #[test]
     fn the_range_is_that_of_chi_square() {
         let tally = Tally {
-            counts: [10, 0, 0],
-            sums: [0.0, 0.0, 10.0],
+            off: [(10, 10.0); FIGURES.len()],
             ..Tally::default()
         };
-        let [least, most] = tally.ratio_range();
+        let (ratio, [least, most]) = tally.ratio(0).unwrap();
+        assert_eq!(ratio, 1.0);
         assert!((least - (10.0_f64 / 20.48).sqrt()).abs() < 0.01, "{least}");
         assert!((most - (10.0_f64 / 3.25).sqrt()).abs() < 0.02, "{most}");
     }
