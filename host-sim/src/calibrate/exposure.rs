@@ -2,12 +2,16 @@
 //!
 //! A light that is switched, averaged over the exposure, is a trapezoid: its ramps last as long as the exposure,
 //! as long as that is shorter than both the bright and the dark part. All frames are folded by phase and a
-//! trapezoid is fitted, bent by a tone curve: pictures are seldom linear in the light. Where the light never shows
-//! fully dark or fully bright the exposure cannot be told from the light's own on-time, and nothing is said.
+//! trapezoid is fitted, bent by a tone curve: pictures are seldom linear in the light. From there a least-squares fit
+//! of all rows (Gauss and Newton, damped) gives the width and its standard deviation.
+//!
+//! An exposure of E and an on-time of D make the same trapezoid as an exposure of D and an on-time of E: only what is
+//! known of the light's duty cycle decides. Where the light never shows fully dark, nothing is said.
 
 use super::fit::Fit;
 use super::simplex::minimum;
-use crate::linear::median;
+use super::uncertainty;
+use crate::linear::{Symmetric, median};
 
 /// Bins that one period is folded into.
 const BINS: usize = 512;
@@ -15,15 +19,47 @@ const BINS: usize = 512;
 /// Exponents of the tone curve that are believed: a camera that writes linear values has 1.
 const TONES: std::ops::RangeInclusive<f64> = 0.4..=2.5;
 
-/// Exposure in periods of the light, and its standard deviation.
+/// The duty cycle is known to this part of the shorter of on-time and off-time.
+const DUTY_TOLERANCE: f64 = 0.1;
+/// Where black is cut off, a dark row's mean is not known to better than this: rounding hides it.
+const LEAST_CUT_OFF: f64 = 0.3;
+/// Steps of the last fit.
+const STEPS: usize = 12;
+/// Half of what a parameter is moved by to see what it does.
+const SMALL: f64 = 1e-5;
+
+/// The transition between dark and bright, in periods of the light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ramp {
-    /// Width of the transition, periods.
+    /// Its width.
     pub periods: f64,
-    /// Its standard deviation.
+    /// Standard deviation of that.
     pub sd: f64,
-    /// Share of the period in which the light is on.
-    pub duty: f64,
+    /// From half way up to half way down.
+    pub bright: f64,
+}
+
+impl Ramp {
+    /// The exposure under a light that is on for `duty` of its period.
+    ///
+    /// # Errors
+    /// The two widths that are seen, one of them the exposure, where `duty` is neither: (ramp, bright or dark part).
+    pub fn exposure(&self, duty: f64) -> Result<f64, (f64, f64)> {
+        // What the light does for the shorter time, and how long that is in the picture.
+        let (short, seen) = if duty <= 0.5 {
+            (duty, self.bright)
+        } else {
+            (1.0 - duty, 1.0 - self.bright)
+        };
+        let is_short = |width: f64| (width - short).abs() <= DUTY_TOLERANCE * short;
+        if is_short(seen) {
+            Ok(self.periods)
+        } else if is_short(self.periods) {
+            Ok(seen)
+        } else {
+            Err((self.periods, seen))
+        }
+    }
 }
 
 /// Phase of the rise, duty, width of the ramps, and the tone curve 1 − (1 − xᵃ)ᵇ: its a and b.
@@ -35,19 +71,29 @@ type Bins = [(f64, f64)];
 /// Fits the trapezoid; `None` where it does not determine the exposure.
 ///
 /// With b fixed at 1 (a power law) and with both exponents free; the two widths differ by what the unknown tone curve
-/// is good for, and that goes into the standard deviation.
-pub fn ramp(rows: &[Vec<f64>], fit: &Fit) -> Option<Ramp> {
+/// is good for, and that goes into the standard deviation. So does what lies between the dark rows and `black`, the value
+/// that pixels were cut off at: noise that is cut off makes dark rows brighter than they are, and ramps shorter.
+pub fn ramp(rows: &[Vec<f64>], fit: &Fit, black: Option<f64>) -> Option<Ramp> {
     let bins = fold(rows, fit);
     let start = first_guess(&bins);
-    let [power, free] = [0.0, 5.0].map(|b| fit_shape(&bins, fit, start, b));
-    let (power, free) = (power?, free?);
+    let [power, free] = [0.0, 5.0].map(|b| {
+        let shape = fit_shape(&bins, fit, start, b)?;
+        refined(rows, fit, &bins, shape, b > 0.0)
+    });
+    let ((power, _), (free, levels)) = (power?, free?);
+    let periods = 0.5 * (power.periods + free.periods);
+    let (dark, bright) = unnormalised(fit, levels);
+    let cut_off = black.map_or(0.0, |black| {
+        (dark - black).max(LEAST_CUT_OFF) / (bright - dark)
+    });
     Some(Ramp {
-        periods: 0.5 * (power.periods + free.periods),
+        periods,
         sd: power
             .sd
             .max(free.sd)
-            .hypot(0.5 * (power.periods - free.periods)),
-        duty: free.duty,
+            .hypot(0.5 * (power.periods - free.periods))
+            .hypot(cut_off * periods),
+        bright: free.bright,
     })
 }
 
@@ -83,7 +129,7 @@ fn first_guess(bins: &Bins) -> Shape {
 }
 
 /// From `start`; `shoulder` is the simplex's size along b, in units of that along the phase.
-fn fit_shape(bins: &Bins, fit: &Fit, start: Shape, shoulder: f64) -> Option<Ramp> {
+fn fit_shape(bins: &Bins, fit: &Fit, start: Shape, shoulder: f64) -> Option<Shape> {
     let cost = |p: &Shape| trapezoid_cost(bins, p).0;
     let mut found = start;
     // A simplex may flatten out on the way; started again it does not.
@@ -92,62 +138,164 @@ fn fit_shape(bins: &Bins, fit: &Fit, start: Shape, shoulder: f64) -> Option<Ramp
         found = minimum(cost, found, sides);
     }
     let [_, duty, width, _, _] = found;
-    let (rss, levels) = trapezoid_cost(bins, &found);
+    let levels = trapezoid_cost(bins, &found).1;
     if !(0.0..1.0).contains(&duty) || width <= 0.0 {
         return None;
     }
-    // Ramps as long as the on-time or the off-time: that is the light's width, not the exposure's.
+    // Ramps as long as the on-time or the off-time: which is the exposure cannot be told.
     if width > 0.8 * duty.min(1.0 - duty) || levels[1] <= levels[0] {
         return None;
     }
     // The dark part must be dark: otherwise other light, or an exposure of more than a period, is in the picture.
     let (dark, bright) = unnormalised(fit, levels);
-    if dark > 0.3 * bright {
-        return None;
-    }
-    let used = bins.iter().filter(|b| b.1 > 0.0).count();
-    let total: f64 = bins.iter().map(|b| b.1).sum();
-    let noise = rss / (used.saturating_sub(7)).max(1) as f64;
-    // Curvature of the cost along the width, the other parameters refitted.
-    let step = (0.05 * width).max(2e-3);
-    let refit = |w: f64| {
-        let at = |p: &Shape| cost(&[p[0], p[1], w, p[3], p[4]]);
-        let mut p = [found[0], found[1], w, found[3], found[4]];
-        for size in [0.003, 0.001] {
-            p = minimum(
-                at,
-                p,
-                [1.0, 1.0, 0.0, 10.0, 2.0 * shoulder].map(|s| s * size),
-            );
-        }
-        at(&p)
-    };
-    let bend = (refit(width + step) - 2.0 * rss + refit(width - step)) / (step * step);
-    let sampling = fit.model.per_row / 12.0_f64.sqrt() / (total / BINS as f64).sqrt().max(1.0);
-    (bend > 0.0).then(|| Ramp {
-        periods: width,
-        sd: (2.0 * noise / bend).sqrt().hypot(sampling),
+    (dark <= 0.3 * bright).then_some(found)
+}
+
+/// A row of a frame, for the last fit.
+struct Cell {
+    frame: usize,
+    row: usize,
+    phase: f64,
+    value: f64,
+    offset: f64,
+    gain: f64,
+}
+
+/// Shape, level of the dark part and height of the bright one over it: all that the last fit changes.
+type All = [f64; 7];
+
+/// The least-squares fit of all rows themselves, from `shape`; b of the tone curve only where it is `free`.
+fn refined(
+    rows: &[Vec<f64>],
+    fit: &Fit,
+    bins: &Bins,
+    shape: Shape,
+    free: bool,
+) -> Option<(Ramp, [f64; 2])> {
+    let cells: Vec<Cell> = cells(rows, fit).collect();
+    let levels = trapezoid_cost(bins, &shape).1;
+    let [phase, duty, width, tone, shoulder] = shape;
+    let start = [
+        phase,
         duty,
+        width,
+        tone,
+        shoulder,
+        levels[0],
+        levels[1] - levels[0],
+    ];
+    let moves: &[usize] = if free {
+        &[0, 1, 2, 3, 4, 5, 6]
+    } else {
+        &[0, 1, 2, 3, 5, 6]
+    };
+    let at = |p: &All, cell: &Cell| {
+        let x = trapezoid((cell.phase - p[0]).rem_euclid(1.0), p[1], p[2]);
+        cell.offset + cell.gain * (p[5] + p[6] * bent(x, p[3], p[4]))
+    };
+    let rss = |p: &All| -> f64 { cells.iter().map(|c| (c.value - at(p, c)).powi(2)).sum() };
+    let slopes = |p: &All, cell: &Cell| -> Vec<f64> {
+        let slope = |&k: &usize| {
+            let side = |by: f64| {
+                let mut near = *p;
+                near[k] += by;
+                at(&near, cell)
+            };
+            (side(SMALL) - side(-SMALL)) / (2.0 * SMALL)
+        };
+        moves.iter().map(slope).collect()
+    };
+    let normal = |p: &All| {
+        let mut normal = Symmetric::zeros(moves.len());
+        let mut right = vec![0.0; moves.len()];
+        for cell in &cells {
+            let line = slopes(p, cell);
+            let residual = cell.value - at(p, cell);
+            normal.add_outer(&line, 1.0);
+            right
+                .iter_mut()
+                .zip(&line)
+                .for_each(|(r, s)| *r += s * residual);
+        }
+        (normal, right)
+    };
+    let (mut found, mut least) = (start, rss(&start));
+    let mut damping = 1e-3;
+    for _ in 0..STEPS {
+        let (equations, right) = normal(&found);
+        let mut damped = equations.clone();
+        for k in 0..moves.len() {
+            damped.add(k, k, damping * equations.at(k, k) + f64::MIN_POSITIVE);
+        }
+        let step = damped.factor()?.solve(&right);
+        let mut next = found;
+        moves.iter().zip(&step).for_each(|(&k, by)| next[k] += by);
+        let possible = next[1] > 0.0
+            && next[1] < 1.0
+            && next[2] > 0.0
+            && TONES.contains(&next[3])
+            && TONES.contains(&next[4]);
+        let next_rss = if possible { rss(&next) } else { f64::INFINITY };
+        if next_rss < least {
+            let gained = (least - next_rss) / least;
+            (found, least) = (next, next_rss);
+            damping *= 0.1;
+            if gained < 1e-9 {
+                break;
+            }
+        } else {
+            damping *= 10.0;
+        }
+    }
+    let column = normal(&found).0.factor()?.inverse_column(2);
+    let height = fit.gain.len();
+    let [mut influence, mut residual] =
+        [(); 2].map(|()| vec![vec![0.0; height]; fit.residual.len()]);
+    for cell in &cells {
+        let left = cell.value - at(&found, cell);
+        let weight: f64 = column
+            .iter()
+            .zip(slopes(&found, cell))
+            .map(|(a, b)| a * b)
+            .sum();
+        residual[cell.frame][cell.row] = left;
+        influence[cell.frame][cell.row] = weight * left;
+    }
+    let ramp = Ramp {
+        periods: found[2],
+        sd: uncertainty::variance(&influence, &residual).max(0.0).sqrt(),
+        bright: found[1],
+    };
+    Some((ramp, [found[5], found[5] + found[6]]))
+}
+
+/// What the last fit uses: rows that are lit, and not left out.
+fn cells<'a>(rows: &'a [Vec<f64>], fit: &'a Fit) -> impl Iterator<Item = Cell> + 'a {
+    let centre = 0.5 * (fit.gain.len() as f64 - 1.0);
+    let typical = median(&fit.gain);
+    let frames = rows.iter().enumerate().take(fit.residual.len());
+    let all = frames.flat_map(|(n, frame)| frame.iter().enumerate().map(move |(y, v)| (n, y, *v)));
+    all.filter_map(move |(n, y, value)| {
+        let gain = fit.gain[y];
+        let lit = !gain.is_nan() && gain >= 0.2 * typical && fit.residual[n][y] != 0.0;
+        lit.then(|| Cell {
+            frame: n,
+            row: y,
+            phase: (fit.model.per_row * (y as f64 - centre) + fit.model.phases[n]).rem_euclid(1.0),
+            value,
+            offset: fit.offset[y],
+            gain,
+        })
     })
 }
 
 /// Normalised light against phase: (mean, count) of every bin.
 fn fold(rows: &[Vec<f64>], fit: &Fit) -> Vec<(f64, f64)> {
-    let centre = 0.5 * (fit.gain.len() as f64 - 1.0);
-    let typical = median(&fit.gain);
     let mut bins = vec![(0.0, 0.0); BINS];
-    for (n, frame) in rows.iter().enumerate().take(fit.residual.len()) {
-        for (y, &value) in frame.iter().enumerate() {
-            let gain = fit.gain[y];
-            if gain.is_nan() || gain < 0.2 * typical || fit.residual[n][y] == 0.0 {
-                continue;
-            }
-            let phase =
-                (fit.model.per_row * (y as f64 - centre) + fit.model.phases[n]).rem_euclid(1.0);
-            let bin = &mut bins[((phase * BINS as f64) as usize).min(BINS - 1)];
-            bin.0 += (value - fit.offset[y]) / gain;
-            bin.1 += 1.0;
-        }
+    for cell in cells(rows, fit) {
+        let bin = &mut bins[((cell.phase * BINS as f64) as usize).min(BINS - 1)];
+        bin.0 += (cell.value - cell.offset) / cell.gain;
+        bin.1 += 1.0;
     }
     for bin in &mut bins {
         if bin.1 > 0.0 {
@@ -224,4 +372,28 @@ fn trapezoid_cost(bins: &Bins, &[phase, duty, width, tone, shoulder]: &Shape) ->
         (syy - level * sy - slope * sxy).max(0.0),
         [level, level + slope],
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Ramp;
+
+    /// An exposure of 0.2 under a light that is on for 0.1 of the period, and one of 0.1 under 0.2: the same picture.
+    #[test]
+    fn only_the_duty_cycle_tells_exposure_and_on_time_apart() {
+        let seen = |periods, bright| Ramp {
+            periods,
+            sd: 1e-3,
+            bright,
+        };
+        assert_eq!(seen(0.1, 0.2).exposure(0.1), Ok(0.2));
+        assert_eq!(seen(0.1, 0.2).exposure(0.2), Ok(0.1));
+        assert_eq!(seen(0.1, 0.2).exposure(0.5), Err((0.1, 0.2)));
+        assert_eq!(seen(0.1, 0.48).exposure(0.5), Ok(0.1));
+        assert_eq!(seen(0.1, 0.53).exposure(0.5), Ok(0.1));
+        // On for most of the period: its dark part shows.
+        assert_eq!(seen(0.1, 0.8).exposure(0.8), Ok(0.1));
+        let long = seen(0.2, 0.7).exposure(0.8).unwrap();
+        assert!((long - 0.3).abs() < 1e-12);
+    }
 }

@@ -49,6 +49,9 @@ pub use refusal::Refusal;
 use rows::Recording;
 use stripes::Stripes;
 
+/// A camera's own clock is as good as this: crystals keep to 1e-4.
+const CAMERA_CLOCK: f64 = 2e-4;
+
 /// What is known of the light (or of the machine tone).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Light {
@@ -58,8 +61,9 @@ pub enum Light {
         hz: f64,
         /// How sure that is, Hz; 0 for a generator.
         hz_sd: f64,
-        /// Whether the light is switched sharply (an LED) and so shows the exposure.
-        switched: bool,
+        /// Share of the period that a sharply switched light (an LED) is on: such a one shows the exposure. `None` for
+        /// other lights.
+        duty: Option<f64>,
     },
     /// Nothing, or about what it is: then frame times of more than one spacing are needed, or the guess must be
     /// nearer than half the frame rate.
@@ -85,16 +89,23 @@ pub fn calibrate_with_stripes(
     recording: &Recording,
     light: Light,
 ) -> Result<(Calibration, Stripes), Refusal> {
-    let switched = matches!(light, Light::Known { switched: true, .. });
+    let (duty, most_harmonics) = match light {
+        Light::Known {
+            duty: Some(duty), ..
+        } => (Some(duty), 90),
+        _ => (None, 6),
+    };
     if let Light::Known { hz, .. } | Light::Unknown { about_hz: Some(hz) } = light
         && !(hz.is_finite() && hz > 0.0)
     {
         return Err(Refusal::LightHz { hz });
     }
-    let stripes = stripes::find(&recording.rows, if switched { 90 } else { 6 })?;
+    let stripes = stripes::find(&recording.rows, most_harmonics)?;
     let mut warnings = Vec::new();
     let fit = &stripes.fit;
-    let rows = fit.gain.len();
+    let used_rows = fit.gain.len();
+    // A part of the picture tells the line time; read-out and blank time are those of all its rows.
+    let rows = recording.picture_rows.unwrap_or(used_rows);
     let times = recording.times_s.as_deref().filter(|t| t.len() > 1);
     let nominal_period = recording.frame_period_s();
 
@@ -103,7 +114,7 @@ pub fn calibrate_with_stripes(
             let verdict = times.map_or(Verdict::Undecided, |t| {
                 // A frame's stripes tell their number and their phase, by the lever of a straight line.
                 let frames = fit.residual.len() as f64;
-                let phase_sd = fit.per_row_sd * (frames / 12.0).sqrt() * rows as f64;
+                let phase_sd = fit.per_row_sd * (frames / 12.0).sqrt() * used_rows as f64;
                 frames::judge(&fit.model.phases, t, hz, phase_sd)
             });
             (hz, hz_sd, verdict)
@@ -124,7 +135,8 @@ pub fn calibrate_with_stripes(
             (found.hz, found.hz_sd, verdict)
         }
     };
-    let relative_sd = (fit.per_row_sd / fit.model.per_row).hypot(hz_sd / hz);
+    let [of_stripes, of_light] = [fit.per_row_sd / fit.model.per_row, hz_sd / hz];
+    let relative_sd = of_stripes.hypot(of_light);
     let line_time_s = fit.model.per_row / hz;
     let readout_s = line_time_s * rows as f64;
 
@@ -141,9 +153,14 @@ pub fn calibrate_with_stripes(
                 below_hz: (1.0 - fit.model.per_row) * rows as f64 / period,
             });
         }
-    } else {
-        warnings
-            .push("one picture, no frame rate: the light's frequency is taken on trust".to_owned());
+    }
+    let known = matches!(light, Light::Known { .. });
+    if known && times.is_none() {
+        warnings.push(match nominal_period {
+            Some(_) => "no frame times: the light's frequency is taken on trust".to_owned(),
+            None => "no frame rate: the light's frequency is taken on trust, and that less than half its period passes from row to row"
+                .to_owned(),
+        });
     }
 
     let mut frame_period = None;
@@ -160,15 +177,24 @@ pub fn calibrate_with_stripes(
                     RollingName::Up
                 }
             });
-            frame_period = nominal_period.map(|p| (p * scale, p * scale_sd.hypot(hz_sd / hz)));
+            frame_period = nominal_period.map(|p| (p * scale, p * scale_sd));
+            if let Some(period) = nominal_period
+                && (scale - 1.0).abs() > CAMERA_CLOCK + 3.0 * scale_sd.hypot(of_light)
+            {
+                warnings.push(format!(
+                    "by the light {:.4} frames a second, by the camera {:.4}: if that is exact, the light's frequency is wrong",
+                    1.0 / (period * scale),
+                    1.0 / period
+                ));
+            }
         }
         Verdict::Undecided if times.is_some() => warnings.push(
-            "rolling direction and blank time are not told: stripes stand still, move by half a period a frame, or the frame rate is not known well enough for so fast a light"
+            "rolling direction and blank time are not told, and the light's frequency is taken on trust: fewer than 3 frames, or stripes that stand still, move by half a period a frame, or a frame rate that is not known well enough for so fast a light"
                 .to_owned(),
         ),
         Verdict::Undecided => {}
         Verdict::Incoherent => warnings
-            .push("frames do not keep one phase (lost frames without --pts?): blank time is not told".to_owned()),
+            .push("frames do not keep one phase (lost frames without --pts?): blank time is not told, and the light's frequency is taken on trust".to_owned()),
         Verdict::Contradiction { seen, expected } => return Err(Refusal::FramePhase { seen, expected }),
     }
     if stripes.left_out.0 > 0 {
@@ -177,19 +203,25 @@ pub fn calibrate_with_stripes(
             stripes.left_out.0, stripes.left_out.1
         ));
     }
-    let mut ramp = None;
+    let mut exposure = None;
     if recording.saturated_share > 0.0 {
         warnings.push(format!(
             "{:.0} % of the pixels are saturated: the exposure is not told",
             100.0 * recording.saturated_share
         ));
-    } else if switched {
-        ramp = exposure::ramp(&recording.rows, fit);
-        if ramp.is_none() {
-            warnings.push(
+    } else if let Some(duty) = duty {
+        match exposure::ramp(&recording.rows, fit, recording.black).map(|ramp| (ramp.exposure(duty), ramp.sd)) {
+            Some((Ok(periods), sd)) => exposure = Some((periods / hz, sd / hz)),
+            Some((Err((one, other)), _)) => warnings.push(format!(
+                "exposure not told: it may be {:.1} or {:.1} µs, as the light is not on for {:.0} % of its period: give --led-duty",
+                1e6 * one / hz,
+                1e6 * other / hz,
+                100.0 * duty
+            )),
+            None => warnings.push(
                 "exposure not told: the light shows no fully dark and fully bright rows (exposure too long, or other light)"
                     .to_owned(),
-            );
+            ),
         }
     }
     let gain = crate::linear::median(&fit.gain);
@@ -205,11 +237,16 @@ pub fn calibrate_with_stripes(
         line_time_s,
         line_time_s_sd: line_time_s * relative_sd,
         frame_period_s: frame_period.map(|p| p.0),
-        frame_period_s_sd: frame_period.map(|p| p.1),
+        frame_period_s_sd: frame_period.map(|p| p.1.hypot(p.0 * of_light)),
         blank_s: frame_period.map(|p| p.0 - readout_s),
-        blank_s_sd: frame_period.map(|p| p.1.hypot(readout_s * relative_sd)),
-        exposure_s: ramp.map(|r| r.periods / hz),
-        exposure_s_sd: ramp.map(|r| r.sd / hz),
+        blank_s_sd: frame_period.map(|p| {
+            // A known light is off by as much in both; an unknown one's frequency is by the clock that tells the period.
+            let by_the_light = if known { p.0 - readout_s } else { readout_s };
+            p.1.hypot(readout_s * of_stripes)
+                .hypot(by_the_light * of_light)
+        }),
+        exposure_s: exposure.map(|e| e.0),
+        exposure_s_sd: exposure.map(|e| e.1),
         rolling,
         contrast: gain / crate::linear::median(&fit.offset).abs().max(1e-9),
         warnings,

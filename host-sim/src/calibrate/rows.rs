@@ -3,6 +3,9 @@
 /// Blocks of columns that are averaged apart, so that saturated ones can be left out.
 const BLOCKS: usize = 32;
 
+/// Share of the pixels that lie at the highest or lowest value where that cuts them off.
+const CUT_OFF: f64 = 0.01;
+
 /// The mean of every row of every frame, and when the frames were taken.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Recording {
@@ -14,6 +17,10 @@ pub struct Recording {
     pub fps: Option<f64>,
     /// Share of the used pixels that are saturated, 0 to 1.
     pub saturated_share: f64,
+    /// The value that dark pixels are cut off at, where many are.
+    pub black: Option<f64>,
+    /// Rows of the whole picture, where `rows` are a part of it.
+    pub picture_rows: Option<usize>,
 }
 
 impl Recording {
@@ -43,11 +50,23 @@ pub struct Collector {
     frames: Vec<Vec<[Block; BLOCKS]>>,
 }
 
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 struct Block {
     sum: f64,
     max: u16,
     at_max: u32,
+    min: u16,
+    at_min: u32,
+}
+
+impl Block {
+    const EMPTY: Self = Self {
+        sum: 0.0,
+        max: 0,
+        at_max: 0,
+        min: u16::MAX,
+        at_min: 0,
+    };
 }
 
 impl Collector {
@@ -65,7 +84,7 @@ impl Collector {
         let width = self.width;
         let frame = rows
             .map(|row| {
-                let mut blocks = [Block::default(); BLOCKS];
+                let mut blocks = [Block::EMPTY; BLOCKS];
                 for (x, &value) in row.iter().enumerate() {
                     let block = &mut blocks[(x * BLOCKS / width.max(1)).min(BLOCKS - 1)];
                     block.sum += f64::from(value);
@@ -73,6 +92,11 @@ impl Collector {
                         std::cmp::Ordering::Greater => (block.max, block.at_max) = (value, 1),
                         std::cmp::Ordering::Equal => block.at_max += 1,
                         std::cmp::Ordering::Less => {}
+                    }
+                    match value.cmp(&block.min) {
+                        std::cmp::Ordering::Less => (block.min, block.at_min) = (value, 1),
+                        std::cmp::Ordering::Equal => block.at_min += 1,
+                        std::cmp::Ordering::Greater => {}
                     }
                 }
                 blocks
@@ -117,13 +141,17 @@ impl Collector {
             })
             .collect();
         let mut used: Vec<usize> = (0..BLOCKS)
-            .filter(|&b| sizes[b] > 0.0 && clipped[b] < 0.01)
+            .filter(|&b| sizes[b] > 0.0 && clipped[b] < CUT_OFF)
             .collect();
         if used.len() < BLOCKS.min(self.width) / 4 {
             used = (0..BLOCKS).filter(|&b| sizes[b] > 0.0).collect();
         }
         let pixels: f64 = used.iter().map(|&b| sizes[b]).sum();
         let share = used.iter().map(|&b| clipped[b] * sizes[b]).sum::<f64>() / pixels.max(1.0);
+        let in_use = || all().flat_map(|row| used.iter().map(move |&b| row[b]));
+        let bottom = in_use().map(|b| b.min).min().unwrap_or(0);
+        let at_bottom: u32 = in_use().filter(|b| b.min == bottom).map(|b| b.at_min).sum();
+        let black = f64::from(at_bottom) > CUT_OFF * row_count * pixels;
         let rows = self
             .frames
             .iter()
@@ -138,7 +166,9 @@ impl Collector {
             rows,
             times_s,
             fps,
-            saturated_share: if share > 0.01 { share } else { 0.0 },
+            saturated_share: if share > CUT_OFF { share } else { 0.0 },
+            black: black.then_some(f64::from(bottom)),
+            picture_rows: None,
         }
     }
 }
@@ -162,6 +192,20 @@ mod tests {
         assert_eq!(recording.rows, vec![vec![100.0, 101.0, 102.0, 103.0]]);
         assert_eq!(recording.saturated_share, 0.0);
         assert_eq!(recording.frame_period_s(), Some(0.02));
+    }
+
+    /// A fifth of the pixels at 3, none below: cut off there. One in 800 there: chance.
+    #[test]
+    fn black_that_is_cut_off_is_told() {
+        for (dark, black) in [(8, Some(3.0)), (1, None)] {
+            let mut collector = Collector::new(40, 255);
+            let mut row = [100u16; 40];
+            row[..dark].fill(3);
+            let rows = (0..20).map(|y| if dark == 8 || y == 0 { row } else { [100; 40] });
+            let rows: Vec<[u16; 40]> = rows.collect();
+            collector.push(rows.iter().map(|r| &r[..]));
+            assert_eq!(collector.finish(None, None).black, black);
+        }
     }
 
     #[test]

@@ -42,11 +42,21 @@ fn led(hz: f64) -> Led {
     }
 }
 
+/// A light that is on for `is` of its period, and said to be on for `told`.
+fn duty(condition: &mut Condition, is: f64, told: f64) {
+    if let Some(led) = &mut condition.config.light.led {
+        led.duty = is;
+    }
+    if let Light::Known { duty, .. } = &mut condition.light {
+        *duty = Some(told);
+    }
+}
+
 fn generator(hz: f64) -> Light {
     Light::Known {
         hz,
         hz_sd: 0.0,
-        switched: true,
+        duty: Some(0.5),
     }
 }
 
@@ -101,8 +111,15 @@ fn generated() -> Vec<Condition> {
         lit("exposure 60 µs", 1000.0, 60_000),
         lit("exposure 700 µs", 1000.0, 700_000),
         lit("100 Hz, exposure 2 ms", 100.0, 2_000_000),
-        flashing("duty 20 %", |l| l.duty = 0.2),
-        flashing("duty 80 %", |l| l.duty = 0.8),
+        with("duty 20 %", |c| duty(c, 0.2, 0.2)),
+        with("duty 80 %", |c| duty(c, 0.8, 0.8)),
+        // The on-time is shorter than the exposure.
+        with("duty 10 %", |c| duty(c, 0.1, 0.1)),
+        with("duty 10 %, told 50 %", |c| duty(c, 0.1, 0.5)),
+        with("duty 10 %, told 50 %, one frame", |c| {
+            duty(c, 0.1, 0.5);
+            c.config.frames = 1;
+        }),
         flashing("10 % of the flashes missing", |l| l.missing = 0.1),
         with("10 % missing, one frame", |c| {
             c.config.frames = 1;
@@ -216,7 +233,7 @@ fn others() -> Vec<Condition> {
             c.light = Light::Known {
                 hz: 100.0,
                 hz_sd: 0.06,
-                switched: false,
+                duty: None,
             };
         })
     };
@@ -243,7 +260,7 @@ fn others() -> Vec<Condition> {
     let exact = Light::Known {
         hz: 183.4,
         hz_sd: 0.0,
-        switched: false,
+        duty: None,
     };
     let about = |hz| Light::Unknown { about_hz: Some(hz) };
     vec![

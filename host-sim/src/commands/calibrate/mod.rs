@@ -28,6 +28,9 @@ pub struct Args {
     /// An LED flashes at this frequency, Hz
     #[arg(long, value_name = "F")]
     pub led_hz: Option<f64>,
+    /// Share of its period that the LED is on: only so are exposure and on-time told apart
+    #[arg(long, value_name = "D", default_value_t = 0.5, requires = "led_hz")]
+    pub led_duty: f64,
     /// A lamp on mains of this frequency, Hz: it flickers at twice that
     #[arg(long, value_name = "50|60", value_parser = mains)]
     pub mains: Option<u32>,
@@ -54,7 +57,7 @@ pub struct Args {
     /// Start of exposure of every frame: timecode format v2, ms
     #[arg(long, value_name = "FILE")]
     pub pts: Option<PathBuf>,
-    /// Part of the picture to use, px; the line time does not depend on it
+    /// Part of the picture to use, px; read-out and blank time are told of the whole picture all the same
     #[arg(long, value_name = "X,Y,W,H")]
     pub roi: Option<Rect>,
     /// Most frames to use, from the start
@@ -103,6 +106,11 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             return Err(Failure::usage(format!("{name}: want a number above 0")));
         }
     }
+    if !(args.led_duty > 0.0 && args.led_duty < 1.0) {
+        return Err(Failure::usage(
+            "--led-duty: want a number between 0 and 1, such as 0.5".to_owned(),
+        ));
+    }
     let name = args.input.join(" ");
     let recording = if args.from_vibration {
         let mut pictures = Vec::new();
@@ -116,6 +124,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             times_s: info.times_s,
             fps: info.fps,
             saturated_share: 0.0,
+            black: None,
+            picture_rows: info.picture_rows,
         }
     } else {
         let mut collector = None;
@@ -127,7 +137,10 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         let Some(collector) = collector else {
             return Err(Failure::input(format!("{name}: no frame in it")));
         };
-        collector.finish(info.times_s, info.fps)
+        Recording {
+            picture_rows: info.picture_rows,
+            ..collector.finish(info.times_s, info.fps)
+        }
     };
     let (calibration, stripes) = calibrate_with_stripes(&recording, light(args))
         .map_err(|refusal| Failure::input(format!("{name}: {refusal}")))?;
@@ -164,20 +177,20 @@ fn light(args: &Args) -> Light {
         (Some(hz), _, _) => Light::Known {
             hz,
             hz_sd: 0.0,
-            switched: true,
+            duty: Some(args.led_duty),
         },
         (_, Some(mains), _) => {
             let hz = 2.0 * f64::from(mains);
             Light::Known {
                 hz,
                 hz_sd: MAINS_RELATIVE_SD * hz,
-                switched: false,
+                duty: None,
             }
         }
         (_, _, Some(hz)) => Light::Known {
             hz,
             hz_sd: 0.0,
-            switched: false,
+            duty: None,
         },
         _ => Light::Unknown {
             about_hz: args.about_hz,

@@ -19,6 +19,8 @@ pub(super) fn full_scale(picture: &[u16]) -> u16 {
 pub(super) struct Info {
     pub(super) times_s: Option<Vec<f64>>,
     pub(super) fps: Option<f64>,
+    /// Rows of a whole picture.
+    pub(super) picture_rows: Option<usize>,
 }
 
 /// Hands out each picture (the part to use) with its width.
@@ -30,10 +32,11 @@ pub(super) fn each_picture(
         return each_of_several(args, &mut sink);
     };
     if is_picture(name) {
-        picture(args, name, &mut sink)?;
+        let (_, height) = picture(args, name, &mut sink)?;
         return Ok(Info {
             times_s: None,
             fps: args.fps,
+            picture_rows: Some(height),
         });
     }
     if name == "-" {
@@ -71,6 +74,7 @@ fn each_of_several(args: &Args, sink: &mut impl FnMut(&[u16], usize)) -> Result<
     Ok(Info {
         times_s: None,
         fps: args.fps,
+        picture_rows: first.map(|(_, (_, height))| height),
     })
 }
 
@@ -156,6 +160,7 @@ fn each_frame(
     Ok(Info {
         times_s: times_s.filter(|t: &Vec<f64>| t.len() > 1),
         fps,
+        picture_rows: Some(height),
     })
 }
 
