@@ -49,3 +49,14 @@ fn failed_flashes_in_one_frame_bend_nothing() {
     let [error, ..] = tally.rms();
     assert!(error < 2e-5, "{error:.1e} relative");
 }
+
+/// 437.21 Hz at 29.97 fps: 17 frames see the stripes in 17 places, and rows fall on few more, so that the wave form is not
+/// met in full. Of these eight recordings one was 4.1 stated deviations off.
+#[test]
+fn few_places_of_the_period_are_not_trusted_too_far() {
+    let all = condition::all();
+    let name = "437.21 Hz: 17 places in 17 frames";
+    let condition = all.iter().find(|c| c.name == name).expect(name);
+    let tally = Tally::of(condition, 41_000, 8).unwrap();
+    assert_eq!(tally.counts, [8, 0, 0], "{:?}", tally.reasons);
+}

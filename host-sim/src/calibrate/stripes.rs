@@ -185,7 +185,10 @@ fn grown(
     let most = limit(&fit, background);
     let mut fit = grow(&problem, fit, most, wanted);
     let left_out = outliers::leave_out(&mut problem, &mut fit, |problem, fit| {
-        let again = problem.fit(&fit.model, 12).ok_or(Refusal::NoStripes)?;
+        let again = Fit {
+            not_met: fit.not_met,
+            ..problem.fit(&fit.model, 12).ok_or(Refusal::NoStripes)?
+        };
         Ok(grow(problem, again, most, wanted))
     })?;
     Ok(Grown {
@@ -319,10 +322,12 @@ fn first_model(rows: &Rows, per_row: f64) -> Model {
 ///
 /// Where they still do at `limit`, because the rows lie at too few places of the period for the `wanted` ones, what is left
 /// of the wave form looks like fewer harmonics and bends ν: what the last ones moved it by is then added to its standard
-/// deviation. (In a few frames what is left shows in the residuals.)
+/// deviation, or half of what those before them did, if that is more: one step alone is small by chance now and then. (In
+/// a few frames what is left shows in the residuals.)
 fn grow(problem: &Problem<'_>, mut fit: Fit, limit: usize, wanted: usize) -> Fit {
     let mut misses = 0;
-    let mut moved = 0.0;
+    let before = fit.not_met;
+    let mut moved: Option<[f64; 2]> = None;
     for &count in LADDER.iter().filter(|&&c| c <= limit) {
         if count <= fit.model.harmonics.len() {
             continue;
@@ -331,7 +336,8 @@ fn grow(problem: &Problem<'_>, mut fit: Fit, limit: usize, wanted: usize) -> Fit
         start.harmonics.resize(count, [0.0, 0.0]);
         match problem.fit(&start, 3) {
             Some(next) if next.bic() < fit.bic() => {
-                moved = next.model.per_row - fit.model.per_row;
+                let by = (next.model.per_row - fit.model.per_row).abs();
+                moved = Some([by, moved.map_or(0.0, |m| m[0])]);
                 fit = next;
                 misses = 0;
             }
@@ -343,7 +349,8 @@ fn grow(problem: &Problem<'_>, mut fit: Fit, limit: usize, wanted: usize) -> Fit
         }
     }
     fit.not_met = if misses == 0 && limit < wanted && problem.rows.len() >= 4 {
-        moved.abs()
+        // Nothing to add to a fit of before: what was said of it still holds.
+        moved.map_or(before, |[last, one_before]| last.max(0.5 * one_before))
     } else {
         0.0
     };

@@ -120,6 +120,7 @@ fn generated() -> Vec<Condition> {
             duty(c, 0.1, 0.5);
             c.config.frames = 1;
         }),
+        lit("437.21 Hz: 17 places in 17 frames", 437.21, 200_000),
         flashing("10 % of the flashes missing", |l| l.missing = 0.1),
         with("10 % missing, one frame", |c| {
             c.config.frames = 1;
