@@ -60,3 +60,13 @@ fn few_places_of_the_period_are_not_trusted_too_far() {
     let tally = Tally::of(condition, 41_000, 8).unwrap();
     assert_eq!(tally.counts, [8, 0, 0], "{:?}", tally.reasons);
 }
+
+/// Three places and less than two periods: a picture that is smooth is enough. Of these four recordings some were refused.
+#[test]
+fn a_mains_lamp_of_three_places_is_calibrated_on_a_plain_scene() {
+    let all = condition::all();
+    let name = "mains lamp, 30 % flicker";
+    let condition = all.iter().find(|c| c.name == name).expect(name);
+    let tally = Tally::of(condition, 7000, 4).unwrap();
+    assert_eq!(tally.counts, [4, 0, 0], "{:?}", tally.reasons);
+}

@@ -113,26 +113,22 @@ pub fn find(rows: &Rows, most_harmonics: usize) -> Result<Stripes, Refusal> {
     // a smooth picture themselves.
     let periods = fit.model.per_row * height as f64;
     let found = if background == Background::PerRow {
-        let simple = (periods >= LEAST_PERIODS_OF_SMOOTH).then(|| {
-            grown(
-                rows,
-                smooth(fit.model.per_row),
-                fit.clone(),
-                limit,
-                most_harmonics,
-            )
-        });
+        let few_phases =
+            |fit: &Fit| told_apart(&fit.model.phases) < FEWEST_TOLD_APART.min(most_harmonics);
+        // Unless they move: where they come back to few places, no more is asked of a picture that is smooth.
+        let simple = if periods >= LEAST_PERIODS_OF_SMOOTH {
+            Some(smooth(fit.model.per_row))
+        } else {
+            few_phases(&fit).then_some(Background::Smooth(4))
+        };
+        let simple = simple.map(|smooth| grown(rows, smooth, fit.clone(), limit, most_harmonics));
         match simple {
             Some(Ok(smooth)) if !has_own_rows(&smooth.fit) => smooth,
             smooth => {
                 let own = grown(rows, background, fit, limit, most_harmonics)?;
                 match smooth {
                     Some(Ok(smooth)) if smooth.fit.bic() < own.fit.bic() => smooth,
-                    _ if told_apart(&own.fit.model.phases)
-                        < FEWEST_TOLD_APART.min(most_harmonics) =>
-                    {
-                        return Err(Refusal::FewPhases);
-                    }
+                    _ if few_phases(&own.fit) => return Err(Refusal::FewPhases),
                     _ => own,
                 }
             }
@@ -401,11 +397,8 @@ fn check_quality(problem: &Problem<'_>, fit: &Fit) -> Result<(), Refusal> {
         return Err(Refusal::OtherPattern { explained });
     }
     let periods = fit.model.per_row * fit.gain.len() as f64;
-    let least = if problem.background == Background::PerRow {
-        1.0
-    } else {
-        LEAST_PERIODS_OF_SMOOTH
-    };
+    let moving = problem.rows.len() >= 4 && resultant(&fit.model.phases) <= 0.7;
+    let least = if moving { 1.0 } else { LEAST_PERIODS_OF_SMOOTH };
     if periods < least {
         return Err(Refusal::TooFewPeriods { periods, least });
     }
