@@ -3,6 +3,8 @@
 //! A [`Plan`] decides how many rows make a sample and how much memory a window takes; [`Analysis::run`]
 //! then hands every sample and every report to whoever wants them, as they come.
 
+use std::collections::VecDeque;
+
 use rowtone::analyzer::Analyzer;
 use rowtone::camera::Timing;
 use rowtone::report::{Report, Warning};
@@ -142,10 +144,9 @@ pub enum Event<'a> {
 pub struct Analysis<'a> {
     shifts: Shifts,
     analyzer: Analyzer<'a>,
-    /// Since the last report.
-    unmeasured: Unmeasured,
-    /// Rows since the last report.
-    rows: u64,
+    window_ns: i64,
+    /// When the frames of the window started, ns, and the rows of each that were not measured.
+    unmeasured: VecDeque<(i64, Unmeasured)>,
 }
 
 impl<'a> Analysis<'a> {
@@ -163,8 +164,8 @@ impl<'a> Analysis<'a> {
         Ok(Self {
             shifts,
             analyzer,
-            unmeasured: Unmeasured::default(),
-            rows: 0,
+            window_ns: plan.config.window_ns,
+            unmeasured: VecDeque::new(),
         })
     }
 
@@ -204,8 +205,12 @@ impl<'a> Analysis<'a> {
         on: &mut impl FnMut(Event<'_>) -> Result<(), Failure>,
     ) -> Result<(), Failure> {
         on(Event::Frame(frame.start_ns))?;
-        self.rows += self.shifts.part.height as u64;
-        self.unmeasured += frame.unmeasured;
+        let past = frame.start_ns.saturating_sub(self.window_ns);
+        while self.unmeasured.front().is_some_and(|(t, _)| *t < past) {
+            self.unmeasured.pop_front();
+        }
+        self.unmeasured
+            .push_back((frame.start_ns, frame.unmeasured));
         frame
             .samples
             .iter()
@@ -232,24 +237,24 @@ impl<'a> Analysis<'a> {
         on: &mut impl FnMut(Event<'_>) -> Result<(), Failure>,
     ) -> Result<(), Failure> {
         // What only the tracker knows.
-        let share = |rows: u32| f64::from(rows) / self.rows.max(1) as f64;
+        let mut unmeasured = Unmeasured::default();
+        for (_, of_frame) in &self.unmeasured {
+            unmeasured += *of_frame;
+        }
+        let rows = (self.unmeasured.len() * self.shifts.part.height).max(1);
+        let share = |unmeasured: u32| f64::from(unmeasured) / rows as f64;
         for (met, warning) in [
             (
-                share(self.unmeasured.disturbed) > DISTURBED_SHARE,
+                share(unmeasured.disturbed) > DISTURBED_SHARE,
                 Warning::Disturbed,
             ),
-            (self.unmeasured.learning > 0, Warning::Relearned),
-            (
-                share(self.unmeasured.no_texture) > 0.5,
-                Warning::LittleTexture,
-            ),
+            (unmeasured.learning > 0, Warning::Relearned),
+            (share(unmeasured.no_texture) > 0.5, Warning::LittleTexture),
         ] {
             if met {
                 report.warnings.0 |= warning as u16;
             }
         }
-        self.unmeasured = Unmeasured::default();
-        self.rows = 0;
         on(Event::Report(&report))
     }
 }

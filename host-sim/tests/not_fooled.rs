@@ -153,8 +153,8 @@ fn a_hand_is_flagged_and_forgotten_within_a_second() {
         .iter()
         .map(|r| has_warning(r, "disturbed"))
         .collect();
-    // Told with the half second in which it happened.
-    assert_eq!(flagged, [false, true, true, false, false]);
+    // Told with every window that saw it, the fourth of them its last tenth of a second.
+    assert_eq!(flagged, [false, true, true, true, false]);
     assert!(reports.iter().all(|r| !has_warning(r, "relearned")));
     assert_the_tone(&reports[0]);
     assert_the_tone(&reports[4]);
