@@ -210,6 +210,14 @@ impl<'a> Tracker<'a> {
         self.counts
     }
 
+    /// How often a line of a texture that repeats along x was found more than 3 px from where the lines before it led, since
+    /// the beginning: at another of its repetitions, or before it was. What was measured since may be off by their distance. 0 while
+    /// the motion is small, and with [`Config::columns_per_line`].
+    #[cfg(feature = "long-exposure")]
+    pub fn slips(&self) -> u32 {
+        self.paths.slips
+    }
+
     /// Takes one line.
     #[inline]
     pub fn push(&mut self, line: &Line<'_>) -> Outcome {

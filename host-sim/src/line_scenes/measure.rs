@@ -31,6 +31,8 @@ pub struct Figures {
     pub disturbed: f64,
     /// How often the reference was learned anew.
     pub relearned: u32,
+    /// It was told that a texture that repeats was read at another of its repetitions.
+    pub slips_told: bool,
 }
 
 /// Why a case could not be measured.
@@ -129,6 +131,7 @@ pub fn measure(case: &Case) -> Result<Figures, CaseError> {
     figures.no_texture = counts.no_texture as f64 / lines;
     figures.disturbed = counts.disturbed as f64 / lines;
     figures.relearned = counts.relearned;
+    figures.slips_told = tracker.slips() > 0;
     if case.peaks {
         let (found, invented) = look_for_peaks(case, &camera, &peaks)?;
         figures.found = Some((found, case.config.motion.tones.len()));

@@ -103,6 +103,11 @@ impl<'a> Engine<'a> {
         self.tracker.curvature()
     }
 
+    /// A texture that repeats was read at another of its repetitions.
+    pub fn slipped(&self) -> bool {
+        self.tracker.slips() > 0
+    }
+
     /// Measures every line of a frame and hands what came of it to `take`.
     pub fn measure(&mut self, frame: &Frame, mut take: impl FnMut(Displacement)) -> Unmeasured {
         let before = self.tracker.counts();

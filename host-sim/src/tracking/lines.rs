@@ -102,7 +102,12 @@ struct Lines<'a> {
     still_rows: Vec<Displacement>,
     /// Where rows are combined.
     binner: Option<Binner>,
+    /// That stripes were mistaken was told.
+    slips_told: bool,
 }
+
+/// What is told when stripes were mistaken.
+const SLIPPED: &str = "the texture repeats along the rows and was read at another of its stripes: amplitudes and further peaks are not to be trusted; measure a part that does not repeat (--roi)";
 
 impl<'a> Lines<'a> {
     fn new(
@@ -132,6 +137,7 @@ impl<'a> Lines<'a> {
             still,
             still_rows: Vec::new(),
             binner: None,
+            slips_told: false,
         })
     }
 
@@ -229,6 +235,10 @@ impl<'a> Lines<'a> {
                     samples.extend(rows.drain(..).filter_map(|row| binner.push(row)));
                 }
             }
+        }
+        if self.moving.slipped() && !self.slips_told && shifts.note.is_none() {
+            self.slips_told = true;
+            shifts.note = Some(SLIPPED.to_owned());
         }
         // No group reaches over the end of a frame.
         samples.extend(self.binner.as_mut().and_then(Binner::finish));

@@ -21,6 +21,8 @@ pub(super) struct Ahead {
     /// Rows of this frame, or of the one before while this one has had none.
     pub(super) rows: u16,
     foreseen_px: Option<f32>,
+    /// The last row's place, px.
+    last_px: f32,
     /// Mean square of what was foreseen less what came, px².
     miss_px2: f32,
 }
@@ -31,6 +33,7 @@ impl Default for Ahead {
             oscillation: Oscillation::new(0.0, MEMORY_ROWS),
             rows: 0,
             foreseen_px: None,
+            last_px: 0.0,
             miss_px2: 0.0,
         }
     }
@@ -50,12 +53,20 @@ impl Ahead {
         self.foreseen_px.filter(|_| self.miss_px2 < MOST_MISS_PX2)
     }
 
-    pub(super) fn add(&mut self, row: f32, px: f32, information: f32) {
+    /// Takes a row's place; by how much it is not where the rows before it led, px.
+    pub(super) fn add(&mut self, row: f32, px: f32, information: f32) -> f32 {
+        let mut off_px = if self.rows > 0 {
+            px - self.last_px
+        } else {
+            0.0
+        };
         if let Some(foreseen_px) = self.foreseen_px.take() {
-            let miss = px - foreseen_px;
-            self.miss_px2 += (miss * miss - self.miss_px2) / 8.0;
+            off_px = px - foreseen_px;
+            self.miss_px2 += (off_px * off_px - self.miss_px2) / 8.0;
         }
+        self.last_px = px;
         self.rows = self.rows.saturating_add(1);
         self.oscillation.add(row, px, information, false);
+        off_px
     }
 }

@@ -38,6 +38,11 @@ const KEEP_PATHS: f32 = 0.8;
 
 /// Less than this of a motion is left in rows that average over its period: it is no longer told what it was.
 const LEAST_LEFT: f32 = 0.25;
+/// A texture that is as like itself so many steps away, as a share of its likeness to itself, repeats.
+const REPEATS: f32 = 0.75;
+const LEAST_DISTANCE: usize = 5;
+/// On one that does, a line so far from where it is expected was read at another of its repetitions, px.
+const SLIP_PX: f32 = 3.0;
 /// A motion that smears by less, variance, is left to the spectrum, px².
 const LEAST_PX2: f32 = 0.05;
 /// A correction beyond this is no correction, px.
@@ -58,6 +63,10 @@ pub(super) struct Paths {
     start_ns: i64,
     oscillation: Oscillation,
     ahead: Ahead,
+    /// How alike a row of late was to itself further on, 0 to 1.
+    repeats: f32,
+    /// See [`Tracker::slips`](super::Tracker::slips).
+    pub(super) slips: u32,
     /// The path at each of its points, for a speed and an acceleration of 1, in px; all 0 where none is known.
     points: [[f32; 2]; SAMPLES],
     /// Where pictures were along the paths that the reference was learned from.
@@ -88,6 +97,8 @@ impl Paths {
             start_ns: 0,
             oscillation: Oscillation::new(exposure_rows, exposure_rows.clamp(8.0, 64.0)),
             ahead: Ahead::default(),
+            repeats: 0.0,
+            slips: 0,
             points: [[0.0; 2]; SAMPLES],
             histogram: [0.0; BINS],
             sharpen: [[0.0; SHARPEN + 1]; 3],
@@ -101,6 +112,8 @@ impl Paths {
         *self = Self {
             oscillation: Oscillation::new(self.exposure_rows, self.exposure_rows.clamp(8.0, 64.0)),
             ahead: Ahead::default(),
+            repeats: 0.0,
+            slips: self.slips,
             points: [[0.0; 2]; SAMPLES],
             histogram: [0.0; BINS],
             sharpen: [[0.0; SHARPEN + 1]; 3],
@@ -148,6 +161,21 @@ impl Paths {
             self.learned = self.frames.max(1.0);
             self.frames = 0.0;
         }
+    }
+
+    /// A line was found so far from where the lines before led: on a texture that repeats, at another of its repetitions.
+    fn note_slip(&mut self, off_px: f32) {
+        if off_px.abs() > SLIP_PX && self.repeats > 0.5 {
+            self.slips = self.slips.saturating_add(1);
+        }
+    }
+
+    /// How alike the row is to itself further on, of whose correlation function this is.
+    fn note_repetition(&mut self, q: &[f32; 2 * LAGS + 1]) {
+        let slope = |lag: usize| q[LAGS + lag + 1] - q[LAGS + lag - 1];
+        let most = (LEAST_DISTANCE..LAGS).map(slope).fold(0.0, f32::max);
+        let repeats = f32::from(most > REPEATS * slope(0));
+        self.repeats += (repeats - self.repeats) / 64.0;
     }
 
     /// The motion smears the lines: more than what it does to the amplitude must be undone.

@@ -106,7 +106,10 @@ impl Tracker<'_> {
         let row = row as u16 as f32;
         self.paths.oscillation.add(row, px, information, sure);
         if sure {
-            self.paths.ahead.add(row, px, information);
+            let off_px = self.paths.ahead.add(row, px, information);
+            if self.stage == Stage::Tracking {
+                self.paths.note_slip(off_px);
+            }
         }
     }
 
@@ -152,6 +155,7 @@ impl Tracker<'_> {
         );
         let product = product * self.to_reference;
         let mut q = self.correlation_function(row, width)?;
+        self.paths.note_repetition(&q);
         if self.stage == Stage::Tracking {
             table.drop_own_noise(&mut q, self.recipe.level, self.recipe.stride);
         }
