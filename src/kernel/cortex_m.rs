@@ -1,11 +1,11 @@
 //! Cortex-M with the DSP extension (M4, M7, M33): two products an instruction.
 //!
-//! Coefficients that are kept lie two by two ([`super::pairs`]). For four pixels and their coefficients, a word each, `uxtb16`
-//! and `sxtb16` spread the even bytes of the words over two half-words, `eor` turns the pixels round, and two `smlad` multiply
-//! and add two pairs each; `usada8` adds four pixels: six instructions for four pixels. Loads come on top: three for
-//! sixteen pixels where the rows lie at whole words, else eight. A part of a row takes one instruction more, for the sum of its
-//! odd coefficients; coefficients as they are take two extensions more. `boards/mps2-an505/kernel.sh` compares the bits and
-//! counts.
+//! Coefficients that are kept lie two by two, as differences ([`super::pairs`]). For four pixels and what is kept, a word each,
+//! `uxtab16` adds the even pixels to those so far, `eor` turns the uppermost bits of the pixels over, two `smlad` multiply and
+//! add two pairs each, and `sxtab16` makes the next odd coefficients: five instructions for four pixels, and the even pixels
+//! are added up. Loads come on top: two for sixteen pixels where the rows lie at whole words, else eight. A part of a row takes
+//! two instructions more, for where it ends and for the sum of its odd coefficients. `boards/mps2-an505/kernel.sh` compares
+//! the bits and counts.
 //!
 //! The functions are written as a whole, with all registers that there are: a compiler keeps two of them to itself.
 
@@ -15,10 +15,10 @@ use core::arch::naked_asm;
 /// Pixels a block: its sums fit 32 bits, 64·255·2¹⁶ < 2³¹.
 const BLOCK: usize = 1 << 16;
 
-/// The same of coefficients that are kept, whose sums are 256 times as large.
+/// The same of coefficients that are kept, whose sums are 256 times as large; every fourth pixel fits 15 bits, 128·255 < 2¹⁵.
 const KEPT_BLOCK: usize = 1 << 9;
 
-/// Of a line and its whole row, as it is kept; the shorter length of the two counts.
+/// Of a line and its whole row, as it is kept; the shorter length of the two counts. Σ p is that of the even columns.
 #[inline(always)]
 pub(super) fn kept_u8(pixels: &[u8], row: &[i8]) -> LineSums {
     let n = pixels.len();
@@ -35,28 +35,35 @@ pub(super) fn kept_u8(pixels: &[u8], row: &[i8]) -> LineSums {
 pub(super) fn kept_part_u8(pixels: &[u8], row: &[i8], from: usize) -> LineSums {
     let n = pixels.len().min(row.len().saturating_sub(from));
     let mut all = LineSums::default();
-    let mut one_by_one = |span: core::ops::Range<usize>| {
-        let line = pixels.get(span.clone()).unwrap_or_default();
-        for (&p, h) in line.iter().zip(pairs::plain(row, from + span.start)) {
-            all.add(LineSums {
-                product: i32::from(p) * i32::from(h),
-                pixels: u32::from(p),
-            });
-        }
-    };
     // To where two by two begin.
     let head = (from & 1).min(n);
     let whole = (n - head) & !3;
-    one_by_one(0..head);
-    one_by_one(head + whole..n);
-    let (line, coefficients) = (
-        pixels.get(head..head + whole).unwrap_or_default(),
-        row.get(from + head..from + head + whole)
-            .unwrap_or_default(),
-    );
-    for (p, h) in line.chunks(KEPT_BLOCK).zip(coefficients.chunks(KEPT_BLOCK)) {
-        // SAFETY: both slices are of the same length, a multiple of four.
-        all.add(apart(unsafe { part(p.as_ptr(), h.as_ptr(), p.len()) }));
+    if let (1, Some(&p)) = (head, pixels.first()) {
+        let [_, odd, ..] = pairs::of_lanes(pairs::from(row, from - 1));
+        all.product = i32::from(p) * i32::from(odd);
+    }
+    let first = from + head;
+    let mut lanes = pairs::from(row, first);
+    let mut done = 0;
+    while done < whole {
+        let block = (whole - done).min(KEPT_BLOCK);
+        // SAFETY: `head + whole` is at most `n`, which is no more than the pixels are, nor than the columns from `from` on;
+        // a block is a multiple of four.
+        all.add(apart(unsafe {
+            let line = pixels.as_ptr().add(head + done);
+            part(line, row.as_ptr().add(first + done), block, &mut lanes)
+        }));
+        done += block;
+    }
+    if head + whole == n {
+        return all;
+    }
+    let rest = pixels.get(head + whole..n).unwrap_or_default();
+    for (x, (&p, h)) in rest.iter().zip(pairs::of_lanes(lanes)).enumerate() {
+        all.add(LineSums {
+            product: i32::from(p) * i32::from(h),
+            pixels: if x % 2 == 0 { u32::from(p) } else { 0 },
+        });
     }
     all
 }
@@ -89,35 +96,24 @@ fn apart(both: u64) -> LineSums {
     }
 }
 
-/// Four pixels in `$p` and their coefficients as they are kept in `$h`, both lost. The sum over pairs is in r3, Σ p in r4,
-/// 0 in r5, 0x7FFF in both halves of r6; r7 is lost. `$h` has Σ o to be taken of, with its sign changed.
+/// Four pixels in `$p`, lost, and what is kept of their coefficients in `$h`. The sum of both products is in r3, the odd
+/// coefficients in r6, the even pixels so far in r7.
 macro_rules! pairs {
     ($p:literal, $h:literal) => {
         concat!(
-            "usada8 r4, ",
+            "uxtab16 r7, r7, ",
             $p,
-            ", r5, r4\n",
-            "uxtb16 r7, ",
+            "\nsmlad r3, r7, ",
+            $h,
+            ", r3\neor ",
             $p,
+            ", ",
+            $p,
+            ", #0x80008000\nsmlad r3, ",
+            $p,
+            ", r6, r3\nsxtab16 r6, r6, ",
+            $h,
             "\n",
-            "smlad r3, r7, ",
-            $h,
-            ", r3\n",
-            "sxtb16 ",
-            $h,
-            ", ",
-            $h,
-            "\n",
-            "eor ",
-            $p,
-            ", ",
-            $p,
-            ", r6\n",
-            "smlad r3, ",
-            $p,
-            ", ",
-            $h,
-            ", r3\n",
         )
     };
 }
@@ -127,10 +123,9 @@ macro_rules! sixteen {
     () => {
         concat!(
             "ldmia r0!, {{r8-r11}}\n",
-            "ldrd r12, lr, [r1], #8\n",
-            pairs!("r8", "r12"),
-            pairs!("r9", "lr"),
-            "ldrd r12, lr, [r1], #8\n",
+            "ldmia r1!, {{r4, r5, r12, lr}}\n",
+            pairs!("r8", "r4"),
+            pairs!("r9", "r5"),
             pairs!("r10", "r12"),
             pairs!("r11", "lr"),
         )
@@ -138,15 +133,20 @@ macro_rules! sixteen {
 }
 
 /// Four pixels that may lie anywhere: a single word's load needs no alignment on these cores (ARMv7-M and ARMv8-M with
-/// UNALIGN_TRP clear, as after reset). Their odd coefficients are added up in r9, with the sign changed; 1 is in both
-/// halves of r10.
+/// UNALIGN_TRP clear, as after reset). Their coefficients are those of r9, two by two; the odd ones are added up in r4; 1 is
+/// in both halves of r10.
 macro_rules! part_of_four {
     () => {
         concat!(
             "ldr r8, [r0], #4\n",
             "ldr r12, [r1], #4\n",
-            pairs!("r8", "r12"),
-            "smlad r9, r12, r10, r9\n",
+            "uxtab16 r7, r7, r8\n",
+            "smlad r3, r7, r12, r3\n",
+            "sxtb16 r5, r9\n",
+            "eor r8, r8, #0x80008000\n",
+            "smlad r3, r8, r5, r3\n",
+            "smlad r4, r5, r10, r4\n",
+            "sadd16 r9, r9, r12\n",
         )
     };
 }
@@ -178,15 +178,13 @@ macro_rules! times {
 }
 
 /// The sums of the r2 pixels at r0 and coefficients at r1: `$turn` of them a turn, `$pixels`, and what is left in fours,
-/// `$four`. Then `$end` makes Σ h·p in r0 of what is there.
+/// `$four`. Then `$end` makes Σ h·p in r0 and Σ p in r1 of what is there.
 macro_rules! whole_function {
-    ($begin:expr, $turn:literal, $pixels:expr, $four:expr, $end:expr) => {
+    ($push:literal, $begin:expr, $turn:literal, $pixels:expr, $four:expr, $end:expr, $pop:literal) => {
         naked_asm!(
             ".cpu cortex-m33",
-            "push {{r4-r11, lr}}",
+            $push,
             "movs r3, #0",
-            "movs r4, #0",
-            "movs r5, #0",
             $begin,
             concat!("subs r2, #", $turn),
             "blo 3f",
@@ -203,45 +201,63 @@ macro_rules! whole_function {
             "bne 4b",
             "5:",
             $end,
-            "mov r1, r4",
-            "pop {{r4-r11, pc}}",
-            ".ltorg",
+            $pop,
         )
     };
 }
 
-/// A whole row that is kept, of which |Σ o| < 128; both sides lie at whole words.
+/// The even pixels so far make Σ p.
+macro_rules! even_pixels {
+    () => {
+        "uxth r1, r7\nadd r1, r1, r7, lsr #16\n"
+    };
+}
+
+/// A whole row that is kept; both sides lie at whole words. Σ p is that of the even columns.
 ///
 /// # Safety
 /// Both pointers must lie at a multiple of four and be good for `n` bytes, a multiple of four, at most [`KEPT_BLOCK`].
 #[unsafe(naked)]
 unsafe extern "C" fn whole(p: *const u8, h: *const i8, n: usize) -> u64 {
     whole_function!(
-        "ldr r6, =0x7FFF7FFF",
+        "push {{r4-r11, lr}}",
+        "movs r6, #0\nmovs r7, #0",
         "64",
         times!(4, sixteen!()),
         concat!(
             "ldr r8, [r0], #4\n",
-            "ldr r12, [r1], #4\n",
-            pairs!("r8", "r12")
+            "ldr r4, [r1], #4\n",
+            pairs!("r8", "r4")
         ),
-        // The last byte is Σ o, and what stands before it 128·Σ o too small.
-        "sxtb r2, r3\nsubs r0, r3, r2\nasrs r0, r0, #8\nadd r0, r0, r2, lsl #7"
+        concat!("asrs r0, r3, #8\n", even_pixels!()),
+        "pop {{r4-r11, pc}}"
     )
 }
 
-/// A part of a row that is kept, which begins at an even column; both sides lie anywhere.
+/// A part of a row that is kept, which begins at an even column; both sides lie anywhere. The coefficients of its first four
+/// columns, two by two, are in `lanes`, and then those of the four columns behind it. Σ p is that of the even columns.
 ///
 /// # Safety
-/// Both pointers must be good for `n` bytes, a multiple of four, at most [`KEPT_BLOCK`].
+/// `p` and `h` must be good for `n` bytes, a multiple of four, at most [`KEPT_BLOCK`].
 #[unsafe(naked)]
-unsafe extern "C" fn part(p: *const u8, h: *const i8, n: usize) -> u64 {
+unsafe extern "C" fn part(p: *const u8, h: *const i8, n: usize, lanes: &mut u32) -> u64 {
     whole_function!(
-        "ldr r6, =0x7FFF7FFF\nmovs r9, #0\nmov r10, #0x00010001",
+        "push {{r3-r11, lr}}",
+        "ldr r9, [sp]\nldr r9, [r9]\nmovs r4, #0\nmovs r7, #0\nmov r10, #0x00010001",
         "32",
         times!(8, part_of_four!()),
         part_of_four!(),
-        "movw r2, #32767\nmls r0, r9, r2, r3\nasrs r0, r0, #8"
+        concat!(
+            // What the sum by parts owes where it ends, and the odd pixels' uppermost bits.
+            "smuad r5, r7, r9\n",
+            "subs r3, r3, r5\n",
+            "add r3, r3, r4, lsl #15\n",
+            "asrs r0, r3, #8\n",
+            even_pixels!(),
+            "ldr r3, [sp]\n",
+            "str r9, [r3]"
+        ),
+        "pop {{r3-r11, pc}}"
     )
 }
 
@@ -251,5 +267,13 @@ unsafe extern "C" fn part(p: *const u8, h: *const i8, n: usize) -> u64 {
 /// Both pointers must be good for `n` bytes, a multiple of four, at most [`BLOCK`].
 #[unsafe(naked)]
 unsafe extern "C" fn anywhere(p: *const u8, h: *const i8, n: usize) -> u64 {
-    whole_function!("", "32", times!(8, four!()), four!(), "mov r0, r3")
+    whole_function!(
+        "push {{r4-r11, lr}}",
+        "movs r4, #0\nmovs r5, #0",
+        "32",
+        times!(8, four!()),
+        four!(),
+        "mov r0, r3\nmov r1, r4",
+        "pop {{r4-r11, pc}}"
+    )
 }

@@ -1,18 +1,23 @@
-//! Coefficients that are kept, as a kernel likes them best.
+//! Coefficients that are kept, as a kernel likes them best, and what their sums are.
 //!
-//! A row's coefficients are made once and read with every line. A Cortex-M keeps them two by two ([`pairs`]), every other
-//! kernel as they are: then all of this is what it is made of.
+//! A row's coefficients are made once and read with every line. A Cortex-M keeps them as differences, two by two ([`pairs`]),
+//! whatever the kernel, so that its firmware has one form of everything; every other processor as they are.
+//!
+//! Σ p tells of the light. Where a line's time is short it is that of every second column ([`Kernel::with_half_the_light`]): a
+//! Cortex-M has it for nothing. Half the columns of a picture without texture of two pixels a period tell the same, whatever
+//! the shift, with √2 times the noise.
 
-use super::{Kernel, Sums, pairs, spread::Spread};
 #[cfg(all(target_arch = "arm", any(target_feature = "dsp", rowtone_dsp)))]
-use super::{Kind, cortex_m};
+use super::cortex_m;
+use super::{Columns, Kernel, MAX_COEFFICIENT, Sums, pairs, spread::Spread};
+use core::ops::Range;
 
 /// Σ h·p and Σ p of a line of 8-bit pixels, at most 8192: 64·255·8192 < 2³¹.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LineSums {
     /// Σ h·p.
     pub product: i32,
-    /// Σ p.
+    /// Σ p, of all columns or of the even ones.
     pub pixels: u32,
 }
 
@@ -32,35 +37,78 @@ impl LineSums {
     }
 }
 
+/// Σ of every second, the first one included where `from` is even.
+#[inline(always)]
+fn of_even(from: usize, values: impl Iterator<Item = u16>) -> u32 {
+    let even = values.skip(from & 1).step_by(2);
+    even.map(u32::from).sum()
+}
+
 impl Kernel {
-    /// Coefficients are kept two by two.
-    #[inline(always)]
-    pub(crate) fn keeps_pairs(self) -> bool {
-        #[cfg(all(target_arch = "arm", any(target_feature = "dsp", rowtone_dsp)))]
-        return self.0 == Kind::CortexM;
-        #[cfg(not(all(target_arch = "arm", any(target_feature = "dsp", rowtone_dsp))))]
-        false
+    /// The same kernel, whose sums over rows that are kept have Σ p of the even columns of the row only.
+    #[must_use]
+    pub const fn with_half_the_light(self) -> Self {
+        Self(self.0, Columns::Even)
     }
 
-    /// Makes of a row of coefficients what the sums below read. False where it cannot be kept: it must not be measured.
+    /// Σ of those columns of a row that Σ p is of; the first of `values` is column `from`.
+    #[inline(always)]
+    pub(crate) fn light(self, from: usize, values: &[u16]) -> u32 {
+        if self.1 == Columns::All {
+            return values.iter().map(|&value| u32::from(value)).sum();
+        }
+        let (mut sum, mut x) = (0, from & 1);
+        while let Some(&value) = values.get(x) {
+            sum += u32::from(value);
+            x += 2;
+        }
+        sum
+    }
+
+    /// How many columns of a row of this width Σ p is of.
+    #[inline(always)]
+    pub(crate) fn light_columns(self, width: u16) -> u16 {
+        match self.1 {
+            Columns::All => width,
+            Columns::Even => width.div_ceil(2),
+        }
+    }
+
+    /// Coefficients are kept as differences.
+    #[inline(always)]
+    pub(crate) const fn keeps_pairs(self) -> bool {
+        cfg!(all(
+            target_arch = "arm",
+            any(target_feature = "dsp", rowtone_dsp)
+        ))
+    }
+
+    /// Largest magnitude of a coefficient that can be kept.
+    #[inline(always)]
+    pub(crate) fn most_kept(self) -> i8 {
+        match self.keeps_pairs() {
+            true => pairs::MOST,
+            false => MAX_COEFFICIENT,
+        }
+    }
+
+    /// Makes of a row of coefficients what the sums below read. Nothing is done, and it is false, where they cannot be kept: a
+    /// Cortex-M wants |h| < 64, zeros in four columns at either end, and 0 as the sum of the odd columns. Rows of the
+    /// reference are so ([`Build`](crate::reference::Build)).
     #[inline]
     pub fn keep(self, row: &mut [i8]) -> bool {
-        let can = self.can_keep(row);
-        self.keep_some(row);
+        let can = !self.keeps_pairs() || pairs::can_keep(row);
+        if can {
+            self.keep_some(row, 0..row.len());
+        }
         can
     }
 
-    /// The first half of [`Kernel::keep`]: a few coefficients are changed where they must be, Σ h is not.
+    /// [`Kernel::keep`] of a row that can be kept, these columns of it, of which the first is even; from left to right.
     #[inline]
-    pub(crate) fn can_keep(self, row: &mut [i8]) -> bool {
-        !self.keeps_pairs() || pairs::even_out(row)
-    }
-
-    /// The second half, which may be done span by span: each begins at an even column.
-    #[inline]
-    pub(crate) fn keep_some(self, span: &mut [i8]) {
+    pub(crate) fn keep_some(self, row: &mut [i8], span: Range<usize>) {
         if self.keeps_pairs() {
-            pairs::keep(span);
+            pairs::keep(row, span);
         }
     }
 
@@ -74,35 +122,70 @@ impl Kernel {
         plain.chain(pairs.into_iter().flatten())
     }
 
-    /// Moves a row that is kept to the right by `by` (to the left where negative). What comes in is not told: nothing is
-    /// measured there.
+    /// Lays what is kept in these columns of a row, of which the first is even and which are an even number, as it is into `to`,
+    /// `by` columns to the right. `lanes` is what this has left there of the columns before, 0 at first.
     #[inline]
-    pub(crate) fn move_kept(self, row: &mut [i8], by: i32, otherwise: impl Fn(&mut [i8], i32)) {
-        if !self.keeps_pairs() {
-            return otherwise(row, by);
+    pub(crate) fn lay_kept(
+        self,
+        row: &[i8],
+        span: Range<usize>,
+        lanes: &mut u32,
+        to: &mut [i8],
+        by: i32,
+    ) {
+        let (mut state, mut at) = (*lanes, span.start.wrapping_add(by as usize));
+        let row = row.get(span).unwrap_or_default();
+        for both in row.chunks(2) {
+            let plain = match (self.keeps_pairs(), both) {
+                (true, &[a, b]) => pairs::next_two([a, b], &mut state),
+                (_, &[a, b]) => [a, b],
+                // The last of an odd number is 0.
+                _ => [0; 2],
+            };
+            if let Some(to) = to.get_mut(at) {
+                *to = plain[0];
+            }
+            if let Some(to) = to.get_mut(at.wrapping_add(1)) {
+                *to = plain[1];
+            }
+            at = at.wrapping_add(2);
         }
-        for _ in 0..by.unsigned_abs() {
-            pairs::move_by_one(row, by > 0);
-        }
+        *lanes = state;
     }
 
     /// Sums over a line and its whole row, as it is kept. The shorter length of the two counts.
     #[inline(always)]
     pub fn kept_u8(self, pixels: &[u8], row: &[i8]) -> LineSums {
-        match self.0 {
-            #[cfg(all(target_arch = "arm", any(target_feature = "dsp", rowtone_dsp)))]
-            Kind::CortexM => cortex_m::kept_u8(pixels, row),
-            _ => LineSums::of(self.sums_u8(pixels, row)),
+        #[cfg(all(target_arch = "arm", any(target_feature = "dsp", rowtone_dsp)))]
+        if self.1 == Columns::Even {
+            return cortex_m::kept_u8(pixels, row);
         }
+        self.kept_part_u8(pixels, row, 0)
     }
 
     /// Sums over pixels and as many columns of a row that is kept, the first of them `from`.
     #[inline(always)]
     pub fn kept_part_u8(self, pixels: &[u8], row: &[i8], from: usize) -> LineSums {
-        match self.0 {
-            #[cfg(all(target_arch = "arm", any(target_feature = "dsp", rowtone_dsp)))]
-            Kind::CortexM => cortex_m::kept_part_u8(pixels, row, from),
-            _ => LineSums::of(self.sums_u8(pixels, row.get(from..).unwrap_or_default())),
+        let columns = row.get(from..).unwrap_or_default();
+        let values = || pixels.iter().zip(columns).map(|(&p, _)| u16::from(p));
+        #[cfg(all(target_arch = "arm", any(target_feature = "dsp", rowtone_dsp)))]
+        return {
+            let mut sums = cortex_m::kept_part_u8(pixels, row, from);
+            if self.1 == Columns::All {
+                sums.pixels += of_even(from + 1, values());
+            }
+            sums
+        };
+        #[cfg(not(all(target_arch = "arm", any(target_feature = "dsp", rowtone_dsp))))]
+        {
+            let sums = LineSums::of(self.sums_u8(pixels, columns));
+            match self.1 {
+                Columns::All => sums,
+                Columns::Even => LineSums {
+                    pixels: of_even(from, values()),
+                    ..sums
+                },
+            }
         }
     }
 
@@ -110,26 +193,50 @@ impl Kernel {
     #[inline]
     pub(crate) fn kept_part_u16(self, pixels: &[u16], row: &[i8], from: usize) -> Sums {
         if self.keeps_pairs() {
-            return one_by_one(pixels.iter().copied(), pairs::plain(row, from));
+            return self.one_by_one(from, pixels.iter().copied(), pairs::plain(row, from));
         }
-        self.sums_u16(pixels, row.get(from..).unwrap_or_default())
+        let row = row.get(from..).unwrap_or_default();
+        let sums = self.sums_u16(pixels, row);
+        match self.1 {
+            Columns::All => sums,
+            Columns::Even => Sums {
+                pixels: of_even(from, pixels.iter().zip(row).map(|(&p, _)| p)).into(),
+                ..sums
+            },
+        }
     }
 
     /// [`Kernel::kept_u8`] over pixels where they lie.
     #[inline(always)]
     pub(crate) fn kept_spread(self, spread: Spread, bytes: &[u8], row: &[i8]) -> LineSums {
+        let pixels = || spread.pixels(bytes, 0).map(u16::from);
         if self.keeps_pairs() {
-            let pixels = spread.pixels(bytes, 0).map(u16::from);
-            return LineSums::of(one_by_one(pixels, pairs::plain(row, 0)));
+            return LineSums::of(self.one_by_one(0, pixels(), pairs::plain(row, 0)));
         }
-        LineSums::of(self.sums_spread(spread, bytes, row))
+        let sums = LineSums::of(self.sums_spread(spread, bytes, row));
+        match self.1 {
+            Columns::All => sums,
+            Columns::Even => LineSums {
+                pixels: of_even(0, pixels().take(row.len())),
+                ..sums
+            },
+        }
     }
-}
 
-/// Deeper pixels come from larger boards: plain Rust serves.
-fn one_by_one(pixels: impl Iterator<Item = u16>, row: impl Iterator<Item = i8>) -> Sums {
-    pixels.zip(row).fold(Sums::default(), |sums, (p, h)| Sums {
-        product: sums.product + i64::from(i32::from(p) * i32::from(h)),
-        pixels: sums.pixels + u64::from(p),
-    })
+    /// Deeper pixels come from larger boards: plain Rust serves.
+    fn one_by_one(
+        self,
+        from: usize,
+        pixels: impl Iterator<Item = u16>,
+        row: impl Iterator<Item = i8>,
+    ) -> Sums {
+        let pairs = (from..).zip(pixels.zip(row));
+        pairs.fold(Sums::default(), |sums, (x, (p, h))| {
+            let counts = self.1 == Columns::All || x % 2 == 0;
+            Sums {
+                product: sums.product + i64::from(i32::from(p) * i32::from(h)),
+                pixels: sums.pixels + if counts { u64::from(p) } else { 0 },
+            }
+        })
+    }
 }

@@ -74,7 +74,15 @@ pub(crate) fn ask_for<T>(later: &[T]) {
 
 /// Which implementation is used. Only those that the processor can run can be had.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Kernel(Kind);
+pub struct Kernel(Kind, Columns);
+
+/// Which columns' pixels tell of the light.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Columns {
+    All,
+    /// Every second, the first included.
+    Even,
+}
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
@@ -102,11 +110,11 @@ enum Kind {
 
 impl Kernel {
     /// Plain Rust, for every machine.
-    pub const PORTABLE: Self = Self(Kind::Portable);
+    pub const PORTABLE: Self = Self(Kind::Portable, Columns::All);
 
     /// The fastest kernel that this processor can run.
     pub fn detect() -> Self {
-        Self(Self::fastest())
+        Self(Self::fastest(), Columns::All)
     }
 
     #[cfg(target_arch = "x86_64")]
@@ -159,7 +167,8 @@ impl Kernel {
             (best == Kind::Avx512 { vbmi: true }).then_some(Kind::Avx512 { vbmi: false }),
         ];
         let better = (!slower.contains(&Some(best))).then_some(best);
-        slower.into_iter().flatten().chain(better).map(Self)
+        let all = slower.into_iter().flatten().chain(better);
+        all.map(|kind| Self(kind, Columns::All))
     }
 
     /// Runs work on floats, compiled for the vectors that this kernel's processor has. The bits are the
@@ -203,11 +212,10 @@ impl Kernel {
     /// Σ h·p alone, over 16-bit pixels.
     #[inline]
     pub(crate) fn product_u16(self, pixels: &[u16], coefficients: &[i8]) -> i64 {
-        match self.0 {
-            #[cfg(all(target_arch = "arm", any(target_feature = "dsp", rowtone_dsp)))]
-            Kind::CortexM => portable::product_u16(pixels, coefficients),
-            _ => self.sums_u16(pixels, coefficients).product,
-        }
+        #[cfg(target_arch = "arm")]
+        return portable::product_u16(pixels, coefficients);
+        #[cfg(not(target_arch = "arm"))]
+        self.sums_u16(pixels, coefficients).product
     }
 
     /// Sums over 16-bit pixels, as [`Kernel::sums_u8`].
@@ -291,6 +299,46 @@ mod tests {
     }
 
     proptest::proptest! {
+        /// Half the light: whole rows and parts of any row, pixels of any depth, side by side and spread.
+        #[test]
+        fn half_the_light_is_that_of_the_even_columns(
+            mut line in proptest::collection::vec((0u16.., -MAX_COEFFICIENT..=MAX_COEFFICIENT), 0..600),
+            from in 0usize..40,
+        ) {
+            line.iter_mut().for_each(|(p, _)| *p &= 0x7FF);
+            let mut row: Vec<i8> = line.iter().map(|&(_, h)| h).collect();
+            pairs::tests::keepable(&mut row);
+            let from = from.min(row.len());
+            let deep: Vec<u16> = line[from..].iter().map(|&(p, _)| p).collect();
+            let bytes: Vec<u8> = deep.iter().map(|&p| p as u8).collect();
+            let words: Vec<u8> = bytes.iter().flat_map(|&p| [99, p]).collect();
+            let part = &row[from..];
+            let even = |values: &[u16]| -> u64 {
+                let even = values.iter().skip(from % 2).step_by(2);
+                even.map(|&p| u64::from(p)).sum()
+            };
+            let values: Vec<u16> = bytes.iter().map(|&p| p.into()).collect();
+            for kernel in Kernel::all() {
+                let half = kernel.with_half_the_light();
+                let mut kept = row.clone();
+                proptest::prop_assert!(half.keep(&mut kept));
+                for (kernel, light, light_deep) in [
+                    (kernel, exact(&bytes, part).pixels, exact(&deep, part).pixels),
+                    (half, even(&values), even(&deep)),
+                ] {
+                    let sums = LineSums { product: exact(&bytes, part).product as i32, pixels: light as u32 };
+                    proptest::prop_assert_eq!(kernel.kept_part_u8(&bytes, &kept, from), sums);
+                    let deep_sums = Sums { pixels: light_deep, ..exact(&deep, part) };
+                    proptest::prop_assert_eq!(kernel.kept_part_u16(&deep, &kept, from), deep_sums);
+                    proptest::prop_assert_eq!(u64::from(kernel.light(from, &deep)), light_deep);
+                    if from == 0 {
+                        proptest::prop_assert_eq!(kernel.kept_u8(&bytes, &kept), sums);
+                        proptest::prop_assert_eq!(kernel.kept_spread(spread::Spread::Words, &words, &kept), sums);
+                    }
+                }
+            }
+        }
+
         /// Lines of any length that begin anywhere, with any pixels and coefficients.
         #[test]
         fn all_kernels_are_exact(

@@ -7,7 +7,7 @@ use super::{RowTable, Two, at_least_1};
 use crate::{
     align::UNKNOWN_STEPS,
     band::{HALFWAY, Level, MAX_HALF, SLOPE},
-    kernel::{Kernel, MAX_COEFFICIENT, Wide},
+    kernel::{Kernel, Wide},
     noise::PixelNoise,
 };
 use core::ops::Range;
@@ -83,8 +83,9 @@ pub struct Build {
     per_count: f32,
     step: Step,
     column: usize,
-    /// Σ r, in counts.
+    /// Σ r, in counts, and that of the columns that tell of the light.
     total: u64,
+    light: u64,
     /// Squares of the last columns of h as they were, in a ring, and the sum around the present one.
     before: [f32; RING],
     energy: f32,
@@ -93,8 +94,9 @@ pub struct Build {
     alpha_beta: (f32, f32),
     largest: f32,
     carry: f32,
-    /// Σ of the coefficients so far.
+    /// Σ of the coefficients so far; of those of odd columns too, where a kernel keeps them two by two.
     excess: i32,
+    odd_excess: i32,
     /// Σ h²·variance and Σ w·variance.
     noise_power: f32,
     weight_power: f32,
@@ -139,6 +141,7 @@ impl Build {
             step: Step::Weigh,
             column: 0,
             total: 0,
+            light: 0,
             before: [0.0; RING],
             energy: 0.0,
             sums: Moments::default(),
@@ -146,6 +149,7 @@ impl Build {
             largest: 0.0,
             carry: 0.0,
             excess: 0,
+            odd_excess: 0,
             noise_power: 0.0,
             weight_power: 0.0,
             q: [0.0; 2 * LAGS + 1],
@@ -276,6 +280,7 @@ impl Build {
             return;
         };
         self.total += mean.iter().map(|&count| u64::from(count)).sum::<u64>();
+        self.light += u64::from(r.kernel.light(span.start, mean));
         // Nothing but arithmetic, so that a desktop does several columns at once.
         for (((w, &count), &mask), x) in w.iter_mut().zip(mean).zip(mask).zip(span) {
             let value = f32::from(count) * self.per_count;
@@ -410,7 +415,9 @@ impl Build {
         h: &[f32],
         coefficients: &mut [i8],
     ) {
-        let limit = f32::from(MAX_COEFFICIENT - 1);
+        let kernel = self.recipe.kernel;
+        let most = kernel.most_kept();
+        let limit = f32::from(most - 1);
         let scale = if self.largest > 0.0 && self.largest.is_finite() {
             limit / self.largest
         } else {
@@ -420,11 +427,12 @@ impl Build {
             mean.get(span.clone()),
             w.get(span.clone()),
             h.get(span.clone()),
-            coefficients.get_mut(span),
+            coefficients.get_mut(span.clone()),
         ) else {
             return;
         };
-        let most = i32::from(MAX_COEFFICIENT);
+        let most = i32::from(most);
+        let first = span.start;
         let (mut carry, mut excess) = (self.carry, self.excess);
         for (c, &h) in coefficients.iter_mut().zip(h) {
             *c = 0;
@@ -438,6 +446,10 @@ impl Build {
             }
         }
         (self.carry, self.excess) = (carry, excess);
+        if kernel.keeps_pairs() {
+            let odd = coefficients.iter().skip(1 - first % 2).step_by(2);
+            self.odd_excess += odd.map(|&c| i32::from(c)).sum::<i32>();
+        }
         for ((&c, &w), &count) in coefficients.iter().zip(w).zip(mean) {
             let c = f32::from(c);
             let variance = self.recipe.noise.variance(self.value(count));
@@ -449,24 +461,19 @@ impl Build {
     /// A table without texture.
     fn blank(&self) -> RowTable {
         RowTable {
-            pixel_sum: at_least_1(self.total as f32 / self.recipe.counts_per_value),
+            pixel_sum: at_least_1(self.light as f32 / self.recipe.counts_per_value),
             ..RowTable::default()
         }
     }
 
     /// Makes Σ h = 0 exact; false when that cannot be, for want of texture.
     fn settle(&mut self, coefficients: &mut [i8]) -> bool {
-        for c in coefficients.iter_mut() {
-            if self.excess == 0 {
-                break;
-            }
-            if *c != 0 && c.abs() < MAX_COEFFICIENT {
-                let step = self.excess.signum();
-                *c -= step as i8;
-                self.excess -= step;
-            }
-        }
-        self.excess == 0 && self.noise_power > 0.0
+        let kernel = self.recipe.kernel;
+        let excess = match kernel.keeps_pairs() {
+            true => [self.excess - self.odd_excess, self.odd_excess],
+            false => [self.excess, 0],
+        };
+        settle(kernel, coefficients, excess) && self.noise_power > 0.0
     }
 
     /// The table, from the row's phase-correlation function q at whole shifts.
@@ -517,6 +524,24 @@ impl Build {
         table.quadratic_and_cubic = Two::new(a.clamp(-2.0, 2.0), b.clamp(-4.0, 4.0));
         table
     }
+}
+
+/// Takes the excess of a row off, one from each of its first columns; where a kernel keeps coefficients two by two, off the even
+/// ones and off the odd ones. False where there are too few.
+pub(crate) fn settle(kernel: Kernel, coefficients: &mut [i8], mut excess: [i32; 2]) -> bool {
+    let odd = usize::from(kernel.keeps_pairs());
+    for (x, c) in coefficients.iter_mut().enumerate() {
+        if excess == [0, 0] {
+            break;
+        }
+        let left = &mut excess[x & odd];
+        if *left != 0 && *c != 0 && c.abs() < kernel.most_kept() {
+            let step = left.signum();
+            *c -= step as i8;
+            *left -= step;
+        }
+    }
+    excess == [0, 0]
 }
 
 /// [`Build::all`], where vectors are wide.

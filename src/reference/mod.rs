@@ -21,6 +21,7 @@ mod build;
 #[cfg(feature = "long-exposure")]
 use crate::band::{Level, SLOPE};
 
+pub(crate) use build::settle;
 pub use build::{Build, Parts, Recipe};
 
 /// What the line path needs of a row besides its coefficients: 16 bytes.
@@ -29,7 +30,7 @@ pub use build::{Build, Parts, Recipe};
 pub struct RowTable {
     /// 1/q', px per unit of Σ h·p at the reference's brightness.
     px_per_product: f32,
-    /// Σ r over the whole row, at least 1 where the row was built.
+    /// Σ r over the columns that tell of the light, at least 1 where the row was built.
     pixel_sum: f32,
     /// Information, 1/px², and where the row's own reference reads, px. All 0 where the row has no texture.
     information_and_offset: Two,
@@ -93,7 +94,9 @@ impl RowTable {
         self.information_and_offset != Two::ZERO
     }
 
-    /// Σ r over the whole row, in pixel values; at least 1 where the row was built.
+    /// Σ r over the whole row, or its even columns where those tell of the light
+    /// ([`Kernel::with_half_the_light`](crate::kernel::Kernel::with_half_the_light)), in pixel values; at least 1 where the row
+    /// was built.
     #[inline(always)]
     pub fn pixel_sum(&self) -> f32 {
         self.pixel_sum

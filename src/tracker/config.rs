@@ -27,7 +27,8 @@ pub struct Config {
     /// measurement. `u16::MAX`: as much as it likes. With fewer, all that a line may need while measuring (not
     /// while learning) is bounded: a row's
     /// reference grows over many lines, a lost picture is searched for at one place a line, and a line that
-    /// would need more is called disturbed.
+    /// would need more is called disturbed. And the light is told by every second column
+    /// ([`Kernel::with_half_the_light`]).
     pub columns_per_line: u16,
     /// Which implementation of the inner product.
     pub kernel: Kernel,

@@ -48,7 +48,7 @@ impl Tracker<'_> {
         expected_px: f32,
         sums: Option<(f32, f32)>,
     ) -> Result<f32, Unfound> {
-        if expected_px.abs() < self.half_step_px {
+        if expected_px.abs() < self.here_px {
             let Some((product, sum)) = sums.or_else(|| self.sums(row, pixels)) else {
                 return Err(Unfound::NoNumber);
             };
@@ -58,6 +58,7 @@ impl Tracker<'_> {
                 return Ok(near);
             }
             let near = near.clamp(-4.0, 4.0);
+            self.effort = self.effort.saturating_add(1);
             return self.correlate_far(row, table, pixels.pixels(), near, 1);
         }
         self.correlate_far(row, table, pixels.pixels(), expected_px, 0)
@@ -105,17 +106,15 @@ impl Tracker<'_> {
         let mut converged = false;
         for _ in 0..turns {
             let overlap = Overlap::new(width, whole)?;
+            self.effort = self.effort.saturating_add(1);
             let (product, sum) = P::part_sums(
                 self.config.kernel,
                 pixels.get(overlap.line)?,
                 coefficients,
                 overlap.reference.start,
             );
-            let unseen: u32 = mean
-                .get(overlap.unseen)?
-                .iter()
-                .map(|&c| u32::from(c))
-                .sum();
+            let from = overlap.unseen.start;
+            let unseen = self.config.kernel.light(from, mean.get(overlap.unseen)?);
             let seen = table.pixel_sum() - unseen as f32 / self.recipe.counts_per_value;
             self.to_reference = at_least_1(seen) / at_least_1(sum);
             let near = table.shift_px(product * self.to_reference);

@@ -2,13 +2,14 @@
 //!
 //! None of it is done in one line time: a row in its turn is averaged, and its coefficients are built anew,
 //! some columns beside each line, while the old coefficients still serve; a whole reference is moved one
-//! row beside each line.
+//! row after the other, some columns beside each line.
 
 use super::{RowLearning, Stage, Tracker};
 use crate::{
     align::Averaging,
+    kernel::Kernel,
     pixel::Pixel,
-    reference::{Build, Parts, RowTable},
+    reference::{Build, Parts, RowTable, settle},
 };
 
 /// What following remembers.
@@ -27,7 +28,13 @@ pub(super) struct Follow {
 enum Work {
     #[default]
     Nothing,
-    /// A line, kept in the scratch, is averaged into its row; the next column.
+    /// A line is kept in the scratch: where it was, and the factor that brings it to its reference's brightness.
+    Kept {
+        row: usize,
+        shift_px: f32,
+        to_reference: f32,
+    },
+    /// It is averaged into its row; the next column.
     Average {
         row: usize,
         averaging: Averaging,
@@ -41,13 +48,35 @@ enum Work {
         table: RowTable,
         column: usize,
     },
-    /// All rows are moved to the right by `by_px`; those from `next` on are still where they were. First the mean of a row,
-    /// then its coefficients.
+    /// All rows are moved to the right by `by_px`; those from `next` on are still where they were.
     Move {
         by_px: i32,
         next: usize,
-        mean_moved: bool,
+        moving: Moving,
     },
+}
+
+/// How far a row is moved; nothing of it is seen before its end.
+#[derive(Clone, Copy, Debug)]
+enum Moving {
+    /// Its coefficients are laid where they are to be, among the fresh ones; the next column, and what the kernel
+    /// left of those before.
+    Lay { column: usize, lanes: u32 },
+    /// What went over the ends is made up for.
+    Settle,
+    /// They become what the kernel keeps; the next column.
+    Keep { column: usize },
+    /// Its mean is moved; columns that are, from the end that they are moved to.
+    Mean { moved: usize },
+    /// The coefficients take the place of the row's own.
+    Place,
+}
+
+impl Moving {
+    const BEGIN: Self = Self::Lay {
+        column: 0,
+        lanes: 0,
+    };
 }
 
 /// One row in so many frames takes a little of the picture: building its coefficients anew is what costs. All
@@ -72,7 +101,24 @@ impl Follow {
     pub(super) fn is_moving(&self) -> bool {
         matches!(self.work, Work::Move { .. })
     }
+
+    /// By how much the reference of `row` lies to the left of where the other rows' lies, px.
+    pub(super) fn aside_px(&self, row: usize) -> f32 {
+        match self.work {
+            Work::Move { by_px, next, .. } if row >= next => by_px as f32,
+            _ => 0.0,
+        }
+    }
 }
+
+/// Columns at either end of a row that have no coefficients, whatever its band; what is moved further in comes in as 0.
+const ENDS: usize = 4;
+
+/// A column is laid elsewhere, or kept, so many times faster than it is built anew.
+const LAID: usize = 4;
+
+/// Columns of a mean that are moved beside a line.
+const MEAN_COLUMNS: usize = 48;
 
 /// Frames over which the drift is averaged.
 const DRIFT_FRAMES: f32 = 128.0;
@@ -102,23 +148,46 @@ impl Tracker<'_> {
             return;
         }
         P::pack(pixels, self.storage.scratch);
-        if let Some(averaging) = self.averaging(row, pixels.len(), shift_px, MEMORY_FRAMES) {
-            self.follow.work = Work::Average {
-                row,
-                averaging,
-                column: 0,
-            };
+        self.follow.work = Work::Kept {
+            row,
+            shift_px,
+            to_reference: self.to_reference,
+        };
+        if !self.is_hurried() {
+            self.begin_average();
         }
+    }
+
+    /// The line that was kept is about to be averaged.
+    fn begin_average(&mut self) {
+        let Work::Kept {
+            row,
+            shift_px,
+            to_reference,
+        } = self.follow.work
+        else {
+            return;
+        };
+        let now = core::mem::replace(&mut self.to_reference, to_reference);
+        let width = usize::from(self.config.width);
+        let averaging = self.averaging(row, width, shift_px, MEMORY_FRAMES);
+        self.to_reference = now;
+        self.follow.work = averaging.map_or(Work::Nothing, |averaging| Work::Average {
+            row,
+            averaging,
+            column: 0,
+        });
     }
 
     /// Goes on with what is under way, some columns or one row a line. Returns by how much the reference of
     /// `row` lies to the left of where the other rows' lies, px.
-    pub(super) fn follow_one_step<P: Pixel>(&mut self, row: usize) -> f32 {
+    pub(super) fn follow_one_step<P: Pixel>(&mut self, row: usize, columns: u16) -> f32 {
         let width = usize::from(self.config.width);
-        let columns = usize::from(self.config.columns_per_line).max(1);
+        let columns = usize::from(columns).max(1);
         let s = &mut self.storage;
         match &mut self.follow.work {
             Work::Nothing => {}
+            Work::Kept { .. } => self.begin_average(),
             Work::Average {
                 row,
                 averaging,
@@ -160,16 +229,11 @@ impl Tracker<'_> {
             }
             Work::Keep { row, table, column } => {
                 let kernel = self.config.kernel;
-                if *column == 0 && !kernel.can_keep(s.fresh) {
-                    *table = table.without_texture();
-                }
                 // Two by two.
                 let columns = columns.saturating_mul(2);
                 let span = *column..column.saturating_add(columns).min(width);
                 *column = span.end;
-                if let Some(span) = s.fresh.get_mut(span) {
-                    kernel.keep_some(span);
-                }
+                kernel.keep_some(s.fresh, span);
                 if *column == width || !kernel.keeps_pairs() {
                     let span = *row * width..(*row + 1) * width;
                     if let (Some(coefficients), Some(slot)) =
@@ -181,40 +245,107 @@ impl Tracker<'_> {
                     self.follow.work = Work::Nothing;
                 }
             }
-            Work::Move {
-                by_px,
-                next,
-                mean_moved,
-            } => {
-                let by_px = *by_px;
-                let span = *next * width..(*next + 1) * width;
-                // Where a line time is short one after the other; the row of this line must not be moved by half, as it would
-                // be if it were the next one.
-                let at_once = columns >= width;
-                if !*mean_moved
-                    && (at_once || row != *next)
-                    && let Some(mean) = s.mean.get_mut(span.clone())
-                {
-                    move_row(mean, by_px);
-                    *mean_moved = true;
-                    if !at_once {
-                        return if row >= *next { by_px as f32 } else { 0.0 };
-                    }
-                }
-                if *mean_moved && let Some(coefficients) = s.coefficients.get_mut(span) {
-                    let kernel = self.config.kernel;
-                    kernel.move_kept(coefficients, by_px, move_row);
-                    *mean_moved = false;
-                    *next += 1;
-                }
-                let left = row >= *next;
-                if *next >= usize::from(self.config.rows) {
-                    self.follow.work = Work::Nothing;
-                }
-                return if left { by_px as f32 } else { 0.0 };
+            Work::Move { .. } => {
+                self.move_one_step(row, columns);
+                return self.follow.aside_px(row);
             }
         }
         0.0
+    }
+
+    /// Moves some columns of a row, beside the line of row `beside`; a whole one where a line may take what it likes.
+    #[inline(never)]
+    fn move_one_step(&mut self, beside: usize, columns: usize) {
+        let Work::Move {
+            by_px,
+            next,
+            moving,
+        } = &mut self.follow.work
+        else {
+            return;
+        };
+        let (kernel, width) = (self.config.kernel, usize::from(self.config.width));
+        let row = *next * width..(*next + 1) * width;
+        let s = &mut self.storage;
+        let (Some(mean), Some(coefficients), Some(table)) = (
+            s.mean.get_mut(row.clone()),
+            s.coefficients.get_mut(row),
+            s.tables.get_mut(*next),
+        ) else {
+            self.follow.work = Work::Nothing;
+            return;
+        };
+        let at_once = columns >= width;
+        if at_once && !kernel.keeps_pairs() {
+            move_row(coefficients, *by_px);
+            *moving = Moving::Mean { moved: 0 };
+        }
+        loop {
+            match moving {
+                Moving::Lay { column, lanes } => {
+                    if *column == 0 {
+                        s.fresh.fill(0);
+                    }
+                    let columns = columns.saturating_mul(LAID);
+                    let span = *column..column.saturating_add(columns).min(width);
+                    *column = span.end;
+                    let ended = span.end == width;
+                    kernel.lay_kept(coefficients, span, lanes, s.fresh, *by_px);
+                    if ended {
+                        *moving = Moving::Settle;
+                    }
+                }
+                Moving::Settle => {
+                    if !settle_ends(kernel, s.fresh) {
+                        *table = table.without_texture();
+                    }
+                    *moving = Moving::Keep { column: 0 };
+                }
+                Moving::Keep { column } => {
+                    let columns = columns.saturating_mul(LAID);
+                    let span = *column..column.saturating_add(columns).min(width);
+                    *column = span.end;
+                    if span.end == width {
+                        *moving = Moving::Mean { moved: 0 };
+                    }
+                    kernel.keep_some(s.fresh, span);
+                }
+                Moving::Mean { moved } if at_once => {
+                    move_row(mean, *by_px);
+                    *moved = width;
+                    *moving = Moving::Place;
+                }
+                Moving::Mean { moved } => {
+                    let steps = width.div_ceil(MEAN_COLUMNS);
+                    // It is to be done before its own line comes.
+                    let rows = usize::from(self.config.rows);
+                    let ahead = (*next + rows).saturating_sub(beside) % rows;
+                    if *moved == 0 && ahead <= steps + 2 && rows > 2 * steps {
+                        return;
+                    }
+                    let end = (*moved + MEAN_COLUMNS).min(width);
+                    move_some(mean, *by_px, *moved..end);
+                    *moved = end;
+                    if end == width {
+                        *moving = Moving::Place;
+                    }
+                }
+                Moving::Place => {
+                    if !at_once || kernel.keeps_pairs() {
+                        coefficients.copy_from_slice(s.fresh);
+                    }
+                    *next += 1;
+                    *moving = Moving::BEGIN;
+                    if *next >= usize::from(self.config.rows) {
+                        self.follow.work = Work::Nothing;
+                    }
+                    return;
+                }
+            }
+            if !at_once {
+                return;
+            }
+        }
     }
 
     fn build_of(&self, row: usize) -> Build {
@@ -240,8 +371,8 @@ impl Tracker<'_> {
                 scratch: s.scratch,
                 coefficients,
             });
-            let kept = self.config.kernel.keep(coefficients);
-            *slot = if kept { table } else { table.without_texture() };
+            self.config.kernel.keep_some(coefficients, 0..width);
+            *slot = table;
         }
     }
 
@@ -261,12 +392,28 @@ impl Tracker<'_> {
         self.follow.work = Work::Move {
             by_px,
             next: 0,
-            mean_moved: false,
+            moving: Moving::BEGIN,
         };
         self.follow.anchor_px += by_px as f32;
         self.follow.drift_px -= by_px as f32;
         self.prediction.move_by(-by_px as f32);
     }
+}
+
+/// The coefficients at the ends of a row that was moved are left out, and the others make up for them, so that light
+/// that is the same everywhere is still no motion. False where there are too few.
+fn settle_ends(kernel: Kernel, row: &mut [i8]) -> bool {
+    let width = row.len();
+    let mut excess = [0; 2];
+    for x in (0..ENDS).chain(width.saturating_sub(ENDS)..width) {
+        if let Some(h) = row.get_mut(x) {
+            excess[x & 1] -= i32::from(core::mem::take(h));
+        }
+    }
+    if !kernel.keeps_pairs() {
+        excess = [excess[0] + excess[1], 0];
+    }
+    settle(kernel, row, excess)
 }
 
 /// Moves a row to the right by `by` (to the left where negative); what comes in repeats the edge.
@@ -283,9 +430,41 @@ pub(super) fn move_row<T: Copy>(row: &mut [T], by: i32) {
     }
 }
 
+/// Some columns of what [`move_row`] does, counted from the end that it moves to; one after the other it does all.
+fn move_some<T: Copy>(row: &mut [T], by: i32, span: core::ops::Range<usize>) {
+    let last = row.len().saturating_sub(1);
+    let away = by.unsigned_abs() as usize;
+    for x in span {
+        let from = (x + away).min(last);
+        let (to, from) = match by > 0 {
+            true => (last.wrapping_sub(x), last - from),
+            false => (x, from),
+        };
+        if let Some(&v) = row.get(from)
+            && let Some(to) = row.get_mut(to)
+        {
+            *to = v;
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use super::move_row;
+    use super::{move_row, move_some};
+
+    #[test]
+    fn rows_move_piece_by_piece_as_at_once() {
+        for by in [-3, -1, 0, 1, 2, 20] {
+            let mut at_once: [u16; 13] = core::array::from_fn(|x| x as u16 * 7);
+            let mut pieces = at_once;
+            move_row(&mut at_once, by);
+            for span in [0..5, 5..12, 12..13] {
+                move_some(&mut pieces, by, span);
+            }
+            assert_eq!(pieces, at_once, "{by}");
+        }
+        move_some::<u8>(&mut [], 1, 0..3);
+    }
 
     #[test]
     fn rows_move_either_way_and_never_beyond() {

@@ -99,6 +99,7 @@ impl Tracker<'_> {
         self.to_reference = 1.0;
         self.prediction = Prediction::default();
         self.curvature = Curvature::default();
+        self.here_px = 0.5 * f32::from(self.config.stride);
         self.near_px = NEAR_WHILE_LEARNING_PX * f32::from(self.config.stride);
         self.blur.relearn();
         #[cfg(feature = "long-exposure")]
@@ -145,6 +146,9 @@ impl Tracker<'_> {
                 self.paths.end_round(true);
                 self.stage = Stage::Tracking;
                 self.near_px = NEAR_PX * f32::from(self.config.stride);
+                if self.is_hurried() {
+                    self.here_px = self.near_px;
+                }
             }
             Stage::Tracking => {}
         }
@@ -152,6 +156,10 @@ impl Tracker<'_> {
         #[cfg(feature = "long-exposure")]
         if self.paths.smear() {
             self.prediction.expect_far();
+        }
+        if self.is_hurried() {
+            // Lines of a motion that may be swift take longer.
+            self.prediction.come_to_rest();
         }
         self.curvature = self.usual_curvature();
         self.blur.end_round();

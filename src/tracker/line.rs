@@ -22,6 +22,10 @@ use crate::{
 /// A line that was looked at and is further than this from where it was expected has jumped, px.
 const JUMP_PX: f32 = 1.0;
 
+/// Inner products of a line that is read at another whole pixel, beside which nothing else can be done where a line time is short; a look takes as
+/// long.
+const MUCH: u8 = 2;
+
 /// Where a line is against the reference, and what it knows of that.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Place {
@@ -249,6 +253,7 @@ impl Tracker<'_> {
         }
         let row = usize::from(line.row);
         let measured = self.measure_quietly(row, pixels)?;
+        self.effort = 0;
         if row >= self.attend {
             let before = core::mem::replace(&mut self.to_reference, measured.to_reference);
             let fits = self.fits(row, pixels.pixels(), measured.shift_px);
@@ -283,10 +288,25 @@ impl Tracker<'_> {
             self.next_frame(line.frame, line.start_ns);
         }
         let mut aside_px = 0.0;
-        if self.beside && self.stage == Stage::Tracking {
+        let beside = self.beside && self.stage == Stage::Tracking;
+        // Then how much time there is is known only afterwards.
+        let afterwards = beside && self.is_hurried();
+        if afterwards {
+            aside_px = self.follow.aside_px(row);
+            self.look_elsewhere();
+        } else if beside {
             aside_px = self.work_beside::<R::P>(row);
         }
+        // A line that will be looked at has enough to do.
+        let idle = row < self.attend;
+        self.effort = 0;
         let found = self.locate(row, &mut pixels, aside_px, sums);
+        if afterwards && self.effort < MUCH && (idle || self.follow.is_moving()) {
+            let columns = self.config.columns_per_line;
+            let fewer = if self.effort > 0 { columns / 4 } else { 0 };
+            self.follow_one_step::<R::P>(row, columns - fewer);
+            self.beside = self.follow.is_busy() || self.watch.is_searching();
+        }
         if self.stage != Stage::Tracking {
             self.counts.learning = self.counts.learning.wrapping_add(1);
             self.learn(row, pixels.pixels(), found);
@@ -312,7 +332,7 @@ impl Tracker<'_> {
     /// motion is swift, and at the beginning of a frame.
     fn settle_quiet(&mut self, frame: u32) {
         // Where lines are expected then stays between the shifts of those before, none of which is further than `near_px`.
-        let near = self.prediction.rest_px().abs() < self.half_step_px;
+        let near = self.prediction.rest_px().abs() < self.here_px;
         let undisturbed = !self.follow.is_moving() && !self.watch.is_searching();
         let calm = undisturbed && self.prediction.is_at_rest() && self.flicker.is_settled() && near;
         let rows = usize::from(self.config.rows);
@@ -332,18 +352,17 @@ impl Tracker<'_> {
     #[cold]
     #[inline(never)]
     fn work_beside<P: Pixel>(&mut self, row: usize) -> f32 {
-        // A line that will be looked at has enough to do.
-        let idle = row < self.attend;
-        let aside_px = if idle || self.follow.is_moving() || !self.is_hurried() {
-            self.follow_one_step::<P>(row)
-        } else {
-            0.0
-        };
+        let aside_px = self.follow_one_step::<P>(row, self.config.columns_per_line);
+        self.look_elsewhere();
+        self.beside = self.follow.is_busy() || self.watch.is_searching();
+        aside_px
+    }
+
+    /// A lost line is looked for where it is its turn.
+    fn look_elsewhere(&mut self) {
         if let Some(start_px) = self.start_px() {
             self.prediction.suppose(start_px);
         }
-        self.beside = self.follow.is_busy() || self.watch.is_searching();
-        aside_px
     }
 
     #[cold]
@@ -404,7 +423,10 @@ impl Tracker<'_> {
             }
         };
         let surprise = shift_px - expected;
-        let due = row >= self.attend
+        // After two inner products there is no time for it where it is but its turn; the next one will do.
+        let in_turn = row >= self.attend
+            && (self.effort < MUCH || !self.is_hurried() || self.watch.is_uneasy());
+        let due = in_turn
             || surprise * surprise * information_per_px2 > 49.0 + information_per_px2
             || !Flicker::is_plausible(before, self.to_reference);
         let mut jumped = false;
@@ -414,7 +436,9 @@ impl Tracker<'_> {
             if self.prediction.needs_more_than(information_per_px2) {
                 return Err(Left::NoTexture);
             }
-            let Some(looked) = self.look_and_follow(row, &table, pixels.pixels(), shift_px) else {
+            let looked = self.look_and_follow(row, &table, pixels.pixels(), shift_px);
+            self.effort = self.effort.saturating_add(MUCH);
+            let Some(looked) = looked else {
                 return Err(Left::Disturbed);
             };
             shift_px = looked;
@@ -438,7 +462,8 @@ impl Tracker<'_> {
 
     /// A row without texture tells of the light too, where it is neither dark nor near to being clipped.
     fn note_light<R: Row>(&mut self, row: usize, table: &RowTable, pixels: &R) {
-        let mean = table.pixel_sum() / f32::from(self.config.width);
+        let columns = self.config.kernel.light_columns(self.config.width);
+        let mean = table.pixel_sum() / f32::from(columns);
         let (dark, bright) = (self.recipe.saturation / 16.0, self.recipe.saturation * 0.6);
         if !(dark..bright).contains(&mean) {
             return;

@@ -108,8 +108,12 @@ pub struct Tracker<'a> {
     beside: bool,
     /// The row from which on the next line is looked at.
     attend: usize,
-    /// Half the pixels from one to the next of the same colour, and `NEAR_PX` of them.
-    half_step_px: f32,
+    /// What the line has taken beyond most: inner products where it had moved by whole pixels, and looks, each as two.
+    effort: u8,
+    /// A line that is expected nearer than this is read where its reference lies: half the pixels from one to the next of
+    /// the same colour, or `near_px` where a line time is short, as reading it elsewhere takes longer.
+    here_px: f32,
+    /// `NEAR_PX` of those pixels.
     near_px: f32,
     counts: Counts,
 }
@@ -120,8 +124,11 @@ impl<'a> Tracker<'a> {
     ///
     /// # Errors
     /// [`ConfigError`] names the field that is out of range, or the buffer that is too short.
-    pub fn new(config: Config, storage: Storage<'a>) -> Result<Self, ConfigError> {
+    pub fn new(mut config: Config, storage: Storage<'a>) -> Result<Self, ConfigError> {
         let storage = config.check(storage)?;
+        if config.columns_per_line != u16::MAX {
+            config.kernel = config.kernel.with_half_the_light();
+        }
         let values = f32::from(1u16 << (config.bits - 1)) * 2.0;
         let mut tracker = Self {
             config,
@@ -158,7 +165,8 @@ impl<'a> Tracker<'a> {
             turn: usize::MAX,
             beside: false,
             attend: 0,
-            half_step_px: 0.5 * f32::from(config.stride),
+            effort: 0,
+            here_px: 0.0,
             near_px: NEAR_WHILE_LEARNING_PX * f32::from(config.stride),
             counts: Counts::default(),
         };

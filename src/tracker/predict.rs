@@ -299,6 +299,14 @@ impl Prediction {
         self.far = true;
     }
 
+    /// The rounds of learning have ended. Their frames, each against the first one's own motion, may have seemed swift: where it
+    /// did not go far, it was not.
+    pub(super) fn come_to_rest(&mut self) {
+        if !self.far {
+            self.swift_frames = 0;
+        }
+    }
+
     fn forget(&mut self) {
         self.information = 0.0;
         self.speed_px = 0.0;

@@ -377,6 +377,39 @@ fn in_a_hurry_a_creeping_picture_is_followed_row_by_row() {
 }
 
 #[test]
+fn half_the_light_tells_as_much_of_a_lamp() {
+    // 30 % at 91 Hz, so another light in every frame, before a tone of 0.4 px: light that is told wrongly is a wrong scale, a share of the shift.
+    let shift = tone(11.0, 0.4);
+    for columns_per_line in [u16::MAX, 4] {
+        let (mut memory, mut camera) = (Memory::new(), Camera::new(surface));
+        let mut tracker = memory.tracker_in_steps(1, columns_per_line);
+        let mut before: Option<Vec<f32>> = None;
+        let mut worst = 0.0f32;
+        for frame in 0..u32::from(LEARN_FRAMES) * 2 + 25 {
+            let flicker = |row: u16, pixels: &mut [u8; WIDTH]| {
+                let ns = i64::from(frame) * FRAME_NS + timing().start_ns(row);
+                let light = 1.0 + 0.3 * libm::sinf(core::f32::consts::TAU * 91e-9 * ns as f32);
+                for p in pixels {
+                    *p = libm::roundf(0.7 * light * f32::from(*p)) as u8;
+                }
+            };
+            let outcomes = camera.show(&mut tracker, &shift, flicker);
+            if frame < u32::from(LEARN_FRAMES) * 2 {
+                continue;
+            }
+            let now = errors(&outcomes, &shift);
+            if let Some(before) = &before {
+                let changes = now.iter().zip(before).map(|(a, b)| (a - b).abs());
+                worst = changes.fold(worst, f32::max);
+            }
+            before = Some(now);
+        }
+        // Some five standard deviations of two rows, 0.009 px each.
+        assert!(worst < 0.06, "{columns_per_line}: {worst} px");
+    }
+}
+
+#[test]
 fn in_a_hurry_swift_motion_is_followed_row_by_row() {
     for (hz, amplitude_px) in [(7.3, 4.0), (43.7, 4.0), (213.7, 4.0)] {
         let (mut memory, mut camera) = (Memory::new(), Camera::new(surface));

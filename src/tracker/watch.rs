@@ -16,11 +16,12 @@ use crate::{noise::LEAST_VARIANCE, pixel::Pixel, reference::RowTable};
 const EVERY: usize = 32;
 const EVERY_IN_A_HURRY: usize = 64;
 
-/// Columns that are looked at, about: of a line that may be anywhere, of one among others that fitted, and where
-/// a line time is short.
+/// Columns that are looked at, about: of a line that may be anywhere, of one among others that fitted, where a line time is
+/// short, and where the line has moved by whole pixels then, which takes longer.
 const COLUMNS: usize = 48;
 const COLUMNS_AMONG_FITTING: usize = 24;
 const COLUMNS_IN_A_HURRY: usize = 12;
+const COLUMNS_IN_MORE_HURRY: usize = 10;
 
 /// A search begins anew every so many pixels of one colour: where correlation converges from on a sharp
 /// texture too.
@@ -60,6 +61,11 @@ impl Watch {
         self.start.is_some()
     }
 
+    /// Every line is to be looked at, and not only because a frame has just begun.
+    pub(super) fn is_uneasy(&self) -> bool {
+        self.every_line && (self.unfit > 0 || self.is_searching())
+    }
+
     /// The next row to be looked at after `row`.
     pub(super) fn next_due(&self, row: usize, hurried: bool) -> usize {
         if self.every_line {
@@ -67,7 +73,8 @@ impl Watch {
         }
         let every = if hurried { EVERY_IN_A_HURRY } else { EVERY };
         let next = row + 1;
-        next + (self.turn % every + every - next % every) % every
+        // Both are powers of two.
+        next + (self.turn.wrapping_sub(next) & (every - 1))
     }
 
     pub(super) fn begin_frame(&mut self, frame: u32) {
@@ -204,7 +211,8 @@ impl Tracker<'_> {
         let columns = match self.config.columns_per_line {
             u16::MAX if self.watch.every_line || self.stage != Stage::Tracking => COLUMNS,
             u16::MAX => COLUMNS_AMONG_FITTING,
-            _ => COLUMNS_IN_A_HURRY,
+            _ if self.effort == 0 => COLUMNS_IN_A_HURRY,
+            _ => COLUMNS_IN_MORE_HURRY,
         };
         // What the motion carries in and out at the ends is little known.
         let from = r.margin_px + r.stride;

@@ -10,23 +10,30 @@ fn main() {
 mod on_the_board {
     use core::fmt::Write;
     use cortex_m_rt::entry;
-    use rowtone::kernel::{Kernel, LineSums, MAX_COEFFICIENT, Sums};
+    use rowtone::kernel::{Kernel, LineSums, MAX_COEFFICIENT};
     use rowtone_mps2_an505::board::{counter::Counter, host, uart::Uart};
     use static_cell::ConstStaticCell;
 
     /// Longest line, px: more than a block of the kernel. And every length up to a bit more than a picture's 320.
     const LONGEST: usize = 70_001;
     const EVERY: usize = 330;
+    /// Longest row that is kept.
+    const LONGEST_KEPT: usize = 8192;
     /// Starts that are tried of either side, bytes from a whole word.
     const STARTS: usize = 4;
+    /// And columns from which on parts are tried.
+    const PARTS: usize = 6;
 
     #[repr(align(4))]
     struct Line<T>([T; LONGEST + STARTS]);
+    #[repr(align(4))]
+    struct Kept([i8; LONGEST_KEPT + STARTS]);
 
     static PIXELS: ConstStaticCell<Line<u8>> = ConstStaticCell::new(Line([0; LONGEST + STARTS]));
     static COEFFICIENTS: ConstStaticCell<Line<i8>> =
         ConstStaticCell::new(Line([0; LONGEST + STARTS]));
-    static KEPT: ConstStaticCell<Line<i8>> = ConstStaticCell::new(Line([0; LONGEST + STARTS]));
+    static KEPT: ConstStaticCell<Kept> = ConstStaticCell::new(Kept([0; LONGEST_KEPT + STARTS]));
+    static PLAIN: ConstStaticCell<Kept> = ConstStaticCell::new(Kept([0; LONGEST_KEPT + STARTS]));
 
     #[entry]
     fn start() -> ! {
@@ -36,47 +43,53 @@ mod on_the_board {
     }
 
     fn run(uart: &mut Uart) -> Option<()> {
-        let (Line(pixels), Line(coefficients), Line(kept)) =
-            (PIXELS.take(), COEFFICIENTS.take(), KEPT.take());
+        let (Line(pixels), Line(coefficients)) = (PIXELS.take(), COEFFICIENTS.take());
+        let (Kept(kept), Kept(plain)) = (KEPT.take(), PLAIN.take());
+        let kernel = Kernel::detect();
         let mut cases = 0u32;
         for pattern in 0..5 {
             fill(pattern, pixels, coefficients);
             for n in (0..=EVERY).chain([640, 1023, 8192, LONGEST]) {
                 for (p, h) in (0..STARTS).flat_map(|p| (0..STARTS).map(move |h| (p, h))) {
                     let (line, row) = (pixels.get(p..p + n)?, coefficients.get(h..h + n)?);
-                    let (own, portable) = (
-                        Kernel::detect().sums_u8(line, row),
+                    let own = kernel.sums_u8(line, row);
+                    same(
+                        uart,
+                        (pattern, n, p, h),
+                        own,
                         Kernel::PORTABLE.sums_u8(line, row),
-                    );
-                    if own != portable {
-                        return wrong(uart, (pattern, n, p, h), own, portable);
-                    }
+                    )?;
                     cases += 1;
                 }
             }
-            for n in (0..=EVERY).chain([512, 640, 1023, 8192]) {
+            for n in (0..=EVERY).chain([512, 640, 1023, LONGEST_KEPT]) {
                 for (p, h) in (0..STARTS).flat_map(|p| (0..STARTS).map(move |h| (p, h))) {
                     let (line, row) = (pixels.get(p..p + n)?, kept.get_mut(h..h + n)?);
                     row.copy_from_slice(coefficients.get(h..h + n)?);
-                    // Where it cannot be kept, its parts are right nevertheless.
-                    let first = usize::from(!Kernel::detect().keep(row));
-                    for from in first..STARTS.min(n) {
-                        let line = line.get(..n - from)?;
-                        let own = match from {
-                            0 => Kernel::detect().kept_u8(line, row),
-                            _ => Kernel::detect().kept_part_u8(line, row, from),
-                        };
-                        let exact = one_by_one(line, Kernel::detect().kept_coefficients(row, from));
-                        if own != exact {
-                            let _ = writeln!(uart, "kernel: from {from}: {own:?}, not {exact:?}");
-                            return wrong(
+                    make_keepable(row);
+                    let plain = plain.get_mut(..n)?;
+                    plain.copy_from_slice(row);
+                    same(uart, (pattern, n, p, h), kernel.keep(row), true)?;
+                    for from in 0..PARTS.min(n) {
+                        let (line, plain) = (line.get(..n - from)?, plain.get(from..)?);
+                        for half in [true, false] {
+                            let kernel = if half {
+                                kernel.with_half_the_light()
+                            } else {
+                                kernel
+                            };
+                            let own = match from {
+                                0 => kernel.kept_u8(line, row),
+                                _ => kernel.kept_part_u8(line, row, from),
+                            };
+                            same(
                                 uart,
-                                (pattern, n, p, h),
-                                Sums::default(),
-                                Sums::default(),
-                            );
+                                (pattern, n, p, h + from),
+                                own,
+                                one_by_one(line, plain, from, half),
+                            )?;
+                            cases += 1;
                         }
-                        cases += 1;
                     }
                 }
             }
@@ -91,7 +104,7 @@ mod on_the_board {
         for (n, start) in [(64, 0), (256, 0), (320, 0), (256, 1)] {
             let (line, row) = (pixels.get(start..start + n)?, kept.get(..n)?);
             let begin = counter.start();
-            core::hint::black_box(Kernel::detect().kept_u8(line, row));
+            core::hint::black_box(kernel.with_half_the_light().kept_u8(line, row));
             let instructions = counter.instructions(begin) - nothing;
             let _ = writeln!(
                 uart,
@@ -101,24 +114,48 @@ mod on_the_board {
         Some(())
     }
 
-    /// One pixel after the other.
-    fn one_by_one(line: &[u8], coefficients: impl Iterator<Item = i8>) -> LineSums {
-        let pairs = line.iter().zip(coefficients);
-        pairs.fold(LineSums::default(), |sums, (&p, h)| LineSums {
+    /// One pixel after the other; the first of them is column `from`. `half`: the light of even columns.
+    fn one_by_one(line: &[u8], coefficients: &[i8], from: usize, half: bool) -> LineSums {
+        let pairs = (from..).zip(line.iter().zip(coefficients));
+        pairs.fold(LineSums::default(), |sums, (x, (&p, &h))| LineSums {
             product: sums.product + i32::from(p) * i32::from(h),
-            pixels: sums.pixels + u32::from(p),
+            pixels: sums.pixels + if half && x % 2 == 1 { 0 } else { u32::from(p) },
         })
     }
 
-    #[cold]
-    fn wrong(
+    /// Of any row one that can be kept: see [`Kernel::keep`].
+    fn make_keepable(row: &mut [i8]) {
+        let n = row.len();
+        for (x, h) in row.iter_mut().enumerate() {
+            let inner = x >= 4 && x + 4 < n;
+            *h = if inner { (*h).clamp(-63, 63) } else { 0 };
+        }
+        let odd = || (1..n).step_by(2);
+        let mut sum: i32 = odd()
+            .filter_map(|x| row.get(x))
+            .map(|&h| i32::from(h))
+            .sum();
+        for x in odd().filter(|&x| x >= 4 && x + 4 < n) {
+            if let Some(h) = row.get_mut(x) {
+                let new = (i32::from(*h) - sum).clamp(-63, 63);
+                sum -= i32::from(*h) - new;
+                *h = new as i8;
+            }
+        }
+    }
+
+    /// `None`, and a word about the case, where these are not the same.
+    fn same<T: PartialEq + core::fmt::Debug>(
         uart: &mut Uart,
         case: (u8, usize, usize, usize),
-        own: Sums,
-        portable: Sums,
+        own: T,
+        expected: T,
     ) -> Option<()> {
-        let _ = writeln!(uart, "kernel: {case:?}: {own:?}, portable {portable:?}");
-        None
+        if own != expected {
+            let _ = writeln!(uart, "kernel: {case:?}: {own:?}, not {expected:?}");
+            return None;
+        }
+        Some(())
     }
 
     /// Two lines of noise, the largest sums of either sign, and nothing at all.
