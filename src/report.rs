@@ -47,6 +47,12 @@ pub enum Warning {
     MoreTones = 1 << 6,
     /// The picture is too dark or saturated in most rows.
     BadLight = 1 << 7,
+    /// The first report since the watchdog reset the board.
+    WatchdogReset = 1 << 8,
+    /// The first report since the board's firmware failed and reset it.
+    PanicReset = 1 << 9,
+    /// The first report since the board was told to start anew.
+    CommandReset = 1 << 10,
 }
 
 /// A set of [`Warning`]s.

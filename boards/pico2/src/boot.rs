@@ -4,6 +4,7 @@
 //! (RP2350 datasheet, section "Watchdog"; the boot ROM uses registers 4 to 7, so these are 0 to 2).
 
 use core::fmt;
+use rowtone::report::{Report, Warning, Warnings};
 
 /// Why the board started.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -16,6 +17,19 @@ pub enum ResetCause {
     Panic,
     /// The firmware was told to.
     Command,
+}
+
+impl ResetCause {
+    /// What the first report says of it; how often the board has started is the report's session. That power came needs
+    /// no warning.
+    pub const fn warnings(self) -> Warnings {
+        Warnings(match self {
+            Self::PowerOn => 0,
+            Self::Watchdog => Warning::WatchdogReset as u16,
+            Self::Panic => Warning::PanicReset as u16,
+            Self::Command => Warning::CommandReset as u16,
+        })
+    }
 }
 
 impl fmt::Display for ResetCause {
@@ -85,6 +99,27 @@ impl Boot {
     }
 }
 
+/// Marks the first report since the start with its cause, and no other.
+#[derive(Clone, Copy, Debug)]
+pub struct FirstReport {
+    untold: Warnings,
+}
+
+impl FirstReport {
+    /// None has been sent since this start.
+    pub const fn new(boot: &Boot) -> Self {
+        Self {
+            untold: boot.cause.warnings(),
+        }
+    }
+
+    /// Call it with each report, in the order in which they are sent.
+    pub fn marked(&mut self, mut report: Report) -> Report {
+        report.warnings.0 |= core::mem::take(&mut self.untold).0;
+        report
+    }
+}
+
 /// What a panic writes before it lets the watchdog reset the board.
 pub fn panicking(scratch: [u32; WORDS]) -> [u32; WORDS] {
     words(read(scratch).map_or(1, |(starts, _)| starts), PANIC)
@@ -147,6 +182,44 @@ mod tests {
             fourth.to_string(),
             "started by command, start 4 since power-on"
         );
+    }
+
+    #[test]
+    fn the_first_report_says_why_and_no_other_does() {
+        let power_on = Boot::new([0; WORDS]);
+        let watchdog = Boot::new(power_on.scratch());
+        let panic = Boot::new(panicking(watchdog.scratch()));
+        let command = Boot::new(restarting(panic.scratch()));
+        let causes = [
+            (power_on, 0),
+            (watchdog, Warning::WatchdogReset as u16),
+            (panic, Warning::PanicReset as u16),
+            (command, Warning::CommandReset as u16),
+        ];
+        for (boot, warning) in causes {
+            let mut first = FirstReport::new(&boot);
+            for expected in [warning, 0, 0] {
+                let lost = Warning::LostFrames as u16;
+                let report = first.marked(report(lost));
+                assert_eq!(report.warnings.0, lost | expected, "{boot}");
+            }
+        }
+    }
+
+    fn report(warnings: u16) -> Report {
+        Report {
+            seq: 0,
+            time_ms: 1000,
+            window_s: 1.0,
+            fps: 57.0,
+            lines: 13_680,
+            lost_frames: 0,
+            noise_px: 0.01,
+            peaks: Default::default(),
+            warnings: Warnings(warnings),
+            um_per_px: None,
+            velocity_mm_s_rms: None,
+        }
     }
 
     #[test]

@@ -65,7 +65,7 @@ pub fn band_velocity(report: &Report) -> Option<f64> {
 }
 
 /// Every warning, its name in JSON, and what it says to a person.
-const WARNINGS: [(Warning, &str, &str); 8] = [
+const WARNINGS: [(Warning, &str, &str); 11] = [
     (
         Warning::HiddenNearFrameRate,
         "hidden_near_frame_rate",
@@ -101,6 +101,21 @@ const WARNINGS: [(Warning, &str, &str); 8] = [
         Warning::BadLight,
         "bad_light",
         "the picture is too dark or saturated in most rows",
+    ),
+    (
+        Warning::WatchdogReset,
+        "watchdog_reset",
+        "the board has started anew: its watchdog reset it",
+    ),
+    (
+        Warning::PanicReset,
+        "panic_reset",
+        "the board has started anew: its firmware failed",
+    ),
+    (
+        Warning::CommandReset,
+        "command_reset",
+        "the board has started anew: it was told to",
     ),
 ];
 

@@ -15,7 +15,7 @@ use rowtone::outbox::Outbox;
 use rowtone::report::Report;
 use rowtone::settings::store::Started;
 use rowtone::settings::{Board, Console, Wire};
-use rowtone_pico2::boot::Boot;
+use rowtone_pico2::boot::{Boot, FirstReport};
 use rowtone_pico2::losses::Losses;
 use rowtone_pico2::plan::{DEFAULTS, LIMITS};
 use static_cell::StaticCell;
@@ -57,6 +57,7 @@ pub(crate) async fn talk(uart: BufferedUart, boot: Boot, started: Started) {
     link.announce(now_us());
     let mut byte = [0];
     let mut said = Losses::default();
+    let mut first = FirstReport::new(&boot);
     loop {
         CORE1_ALIVE.fetch_add(1, Ordering::Relaxed);
         // No more than fits the UART's buffer, so that this never waits while samples do.
@@ -83,7 +84,7 @@ pub(crate) async fn talk(uart: BufferedUart, boot: Boot, started: Started) {
             // Noise on the line: what was garbled fails its check or is no command.
             Either4::First(_) => {}
             Either4::Second(report) => {
-                link.push(report);
+                link.push(first.marked(report));
                 let losses = losses();
                 if losses != said {
                     said = losses;
