@@ -177,7 +177,8 @@ impl Search {
                 return false;
             }
             let before = barred.places.len();
-            if let Some(best) = self.best(samples, fit, model, &candidates, &mut barred) {
+            let mut best = model.clone();
+            if self.put_best(samples, fit, model, &mut best, &candidates, &mut barred) {
                 if model.squares - best.squares <= share * best.squares {
                     return false;
                 }
@@ -188,19 +189,15 @@ impl Search {
                         return false;
                     }
                 }
-                let newest = best.tones.last().map(|t| t.frequency);
-                *model = match newest.and_then(|at| self.modulate(samples, fit, model, &best, at)) {
-                    Some(modulated) if modulated.squares < best.squares => modulated,
-                    _ => best,
-                };
+                if let Some(newest) = best.tones.last() {
+                    let at = newest.frequency;
+                    self.modulate(samples, fit, model, Some(&mut best), at, 0.0);
+                }
+                *model = best;
                 return true;
             }
             // What no further tone explains may come of one's changing.
-            if before == 0
-                && let Some(changing) = self.modulate(samples, fit, model, model, first.frequency)
-                && model.squares - changing.squares > share * changing.squares
-            {
-                *model = changing;
+            if before == 0 && self.modulate(samples, fit, model, None, first.frequency, share) {
                 return true;
             }
             if barred.places.is_full() {
@@ -210,42 +207,47 @@ impl Search {
         }
     }
 
-    /// The candidate that explains most, as a further tone. Those that cannot be put anywhere are barred.
-    fn best(
+    /// Makes `best` the model with the candidate that explains most, as a further tone, and says whether there is one. Those
+    /// that cannot be put anywhere are barred.
+    fn put_best(
         &self,
         samples: &mut Samples<'_>,
         fit: &mut Fit,
         model: &Model,
+        best: &mut Model,
         candidates: &[Candidate],
         barred: &mut Barred,
-    ) -> Option<Model> {
-        let first = candidates.first()?;
-        let mut best: Option<Model> = None;
+    ) -> bool {
+        let Some(first) = candidates.first() else {
+            return false;
+        };
+        let mut found = false;
         for candidate in candidates {
             // Rivals of the first are its ghosts, or it is theirs; others only count where these come to nothing.
             let rival =
                 candidate.gain > 0.5 * first.gain && self.ghostly(samples, *first, *candidate);
-            if (best.is_some() && !rival) || self.is_barred(samples.length_s, barred, *candidate) {
+            if (found && !rival) || self.is_barred(samples.length_s, barred, *candidate) {
                 continue;
             }
             let mut put = false;
             for start in self.starts(samples, candidate.frequency) {
                 if self.tired(fit) {
-                    return best;
+                    return found;
                 }
-                let trial = self.try_tone(samples, fit, model, start);
-                put |= trial.is_some();
-                if let Some(trial) = trial
-                    && best.as_ref().is_none_or(|b| trial.squares < b.squares)
-                {
-                    best = Some(trial);
+                let mut trial = model.clone();
+                if self.put(samples, fit, &mut trial, start) {
+                    put = true;
+                    if !found || trial.squares < best.squares {
+                        *best = trial;
+                        found = true;
+                    }
                 }
             }
-            if !put && best.is_none() {
+            if !put && !found {
                 let _ = barred.places.push(*candidate);
             }
         }
-        best
+        found
     }
 
     /// Nothing can be put at this place, or it is no more than a ghost of what is at such a place: a multiple of the frame
@@ -303,73 +305,83 @@ impl Search {
         starts
     }
 
-    fn try_tone(
+    /// Puts a further tone into `model`; it may be there.
+    fn put(
         &self,
         samples: &mut Samples<'_>,
         fit: &mut Fit,
-        model: &Model,
+        model: &mut Model,
         start: Frequency,
-    ) -> Option<Model> {
-        let mut trial = model.clone();
-        trial.tones.push(Tone::steady(start)).ok()?;
-        fit.refine(samples, &mut trial, STEPS);
-        self.sound(samples, &trial).then_some(trial)
+    ) -> bool {
+        if model.tones.push(Tone::steady(start)).is_err() {
+            return false;
+        }
+        fit.refine(samples, model, STEPS);
+        self.sound(samples, model)
     }
 
     /// A tone that changes within the window has others beside it in a steady model. Where what is `beside` is near a
-    /// larger tone, gives `model` with that one's frequency and amplitude changing instead. `with` is the model with a
-    /// further tone there, or without, where none could be put.
+    /// larger tone, and that one's frequency and amplitude changing instead lowers the sum of squares by more than `share`,
+    /// this is what `with` becomes: the model with a further tone there. Without one, where none could be put, `model` does.
+    /// (In its place: a model is half a kilobyte, and a board's stack is short.)
     fn modulate(
         &self,
         samples: &mut Samples<'_>,
         fit: &mut Fit,
-        model: &Model,
-        with: &Model,
+        model: &mut Model,
+        with: Option<&mut Model>,
         beside: Frequency,
-    ) -> Option<Model> {
-        let near = |tone: &Tone| beside.above(tone.frequency) * samples.length_s;
-        let i = model.tones.iter().position(|t| near(t).abs() < BESIDE)?;
-        let a = with.tones.get(i)?;
-        let further = with.tones.get(model.tones.len());
+        share: f32,
+    ) -> bool {
+        let length_s = samples.length_s;
+        let near = |tone: &Tone| beside.above(tone.frequency) * length_s;
+        let Some(i) = model.tones.iter().position(|t| near(t).abs() < BESIDE) else {
+            return false;
+        };
+        let so_far = with.as_deref().unwrap_or(model);
+        let (Some(old), Some(a)) = (model.tones.get(i), so_far.tones.get(i)) else {
+            return false;
+        };
         let pa = a.amplitude.norm_sqr();
+        let further = so_far.tones.get(model.tones.len());
         let pb = further.map_or(0.0, |b| b.amplitude.norm_sqr());
-        let center = model
-            .tones
-            .get(i)?
+        let center = old
             .frequency
             .plus(pb / (pa + pb) * beside.above(a.frequency));
-        let length_s = samples.length_s;
-        let mut best: Option<Model> = None;
+        let (to_beat, once) = (so_far.squares, further.is_none());
         for chirp in CHIRPS {
             if self.tired(fit) {
                 break;
             }
             let mut trial = model.clone();
-            let tone = trial.tones.get_mut(i)?;
-            if tone.modulated {
-                return None;
-            }
-            tone.modulated = true;
-            if chirp != 0.0 {
-                *tone = Tone {
-                    modulated: true,
-                    chirp,
-                    ..Tone::steady(center)
-                };
+            match trial.tones.get_mut(i) {
+                Some(tone) if !tone.modulated && chirp == 0.0 => tone.modulated = true,
+                Some(tone) if !tone.modulated => {
+                    *tone = Tone {
+                        modulated: true,
+                        chirp,
+                        ..Tone::steady(center)
+                    };
+                }
+                _ => break,
             }
             fit.refine(samples, &mut trial, STEPS);
-            let stayed = trial.tones.get(i)?;
-            let sound = stayed.chirp.abs() < 2.0 * MOST_CHIRP
-                && (stayed.frequency.above(center) * length_s).abs() < BESIDE;
-            if sound && best.as_ref().is_none_or(|b| trial.squares < b.squares) {
-                best = Some(trial);
+            let stayed = trial.tones.get(i).is_some_and(|tone| {
+                tone.chirp.abs() < 2.0 * MOST_CHIRP
+                    && (tone.frequency.above(center) * length_s).abs() < BESIDE
+            });
+            if stayed && to_beat - trial.squares > share * trial.squares {
+                let sound = self.sound(samples, &trial);
+                if sound {
+                    *with.unwrap_or(model) = trial;
+                }
+                return sound;
             }
-            let enough = best.as_ref().is_some_and(|b| b.squares < with.squares);
-            if enough || further.is_none() {
+            if once {
                 break;
             }
         }
-        best.filter(|b| self.sound(samples, b))
+        false
     }
 
     /// Every tone is within the band, not hidden, and apart from the others.
@@ -407,7 +419,8 @@ impl Search {
             let mut without = model.clone();
             without.tones.swap_remove(i);
             for candidate in &ghosts {
-                if let Some(trial) = self.try_tone(samples, fit, &without, candidate.frequency)
+                let mut trial = without.clone();
+                if self.put(samples, fit, &mut trial, candidate.frequency)
                     && trial.squares < 0.9999 * model.squares
                 {
                     *model = trial;
