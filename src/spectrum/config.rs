@@ -17,7 +17,7 @@ pub struct Config {
     pub window_ns: i64,
     /// From the end of a window to the end of the next, ns. Default 0.5 s.
     pub hop_ns: i64,
-    /// Lowest frequency reported, Hz; `None`: the lowest the window can tell from drift, 1.5 periods a window.
+    /// Lowest frequency reported, Hz; `None`: the lowest the window can tell from drift, one period a window.
     pub min_hz: Option<f32>,
     /// Highest frequency reported, Hz; `None`: the highest the samples can tell, 0.49 a sample spacing.
     pub max_hz: Option<f32>,

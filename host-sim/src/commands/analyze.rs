@@ -36,7 +36,7 @@ pub struct Args {
     #[arg(long, value_name = "N", default_value_t = 8,
           value_parser = clap::value_parser!(u8).range(1..=MAX_PEAKS as i64))]
     max_peaks: u8,
-    /// Lowest frequency looked for, Hz [default: 1.5 periods a window]
+    /// Lowest frequency looked for, Hz [default: one period a window]
     #[arg(long, value_name = "F", value_parser = hertz, allow_negative_numbers = true)]
     min_hz: Option<f64>,
     /// Highest frequency looked for, Hz [default: 2000; half the frame rate with --global-shutter]
