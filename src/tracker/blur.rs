@@ -13,10 +13,7 @@
 //! This is for boards. With the feature `long-exposure`, where lines need not be short, the whole path is taken
 //! (`path/`).
 
-use super::{
-    Stage, Tracker,
-    overlap::{Overlap, nearest_step},
-};
+use super::{Stage, Tracker};
 use crate::{camera::Timing, pixel::Pixel, reference::RowTable};
 
 /// Smears change a shift by less than this, px.
@@ -151,7 +148,7 @@ impl Tracker<'_> {
             .unwrap_or(shift_px)
     }
 
-    /// One inner product at the nearest whole shift. `None` for a result that is no number.
+    /// `None` for a result that is no number.
     fn correlate_smeared<P: Pixel>(
         &mut self,
         row: usize,
@@ -160,18 +157,7 @@ impl Tracker<'_> {
         shift_px: f32,
         smear: Smear,
     ) -> Option<f32> {
-        let width = pixels.len();
-        let stride = i32::from(self.config.stride);
-        let whole = nearest_step(shift_px, stride);
-        let overlap = Overlap::new(width, whole)?;
-        let coefficients = self.storage.coefficients.get(row * width..)?.get(..width)?;
-        let (product, _) = P::part_sums(
-            self.config.kernel,
-            pixels.get(overlap.line)?,
-            coefficients,
-            overlap.reference.start,
-        );
-        let product = product * self.to_reference;
+        let (whole, product) = self.nearest_product(row, pixels, shift_px)?;
         let near = table.shift_of_smeared_px(product, smear.variance_px2, smear.skew_px3);
         let unsmeared_px = whole as f32 + near;
         // A correction beyond this is no correction: the expansion does not hold, or the speed is wrong.

@@ -128,6 +128,26 @@ impl Tracker<'_> {
         }
         shift_px.is_finite().then_some((shift_px, converged))
     }
+
+    /// The whole shift nearest to this one, and the inner product there, brought to the reference's brightness.
+    #[inline(always)]
+    pub(super) fn nearest_product<P: Pixel>(
+        &self,
+        row: usize,
+        pixels: &[P],
+        shift_px: f32,
+    ) -> Option<(i32, f32)> {
+        let width = pixels.len();
+        let whole = nearest_step(shift_px, i32::from(self.config.stride));
+        let overlap = Overlap::new(width, whole)?;
+        let (product, _) = P::part_sums(
+            self.config.kernel,
+            pixels.get(overlap.line)?,
+            part(self.storage.coefficients, row, width)?,
+            overlap.reference.start,
+        );
+        Some((whole, product * self.to_reference))
+    }
 }
 
 /// A row of a buffer that holds one row after the other.

@@ -5,11 +5,7 @@ use crate::{
     align::between,
     pixel::Pixel,
     reference::RowTable,
-    tracker::{
-        RowLearning, Stage, Tracker,
-        correlate::part,
-        overlap::{Overlap, nearest_step},
-    },
+    tracker::{RowLearning, Stage, Tracker, correlate::part, overlap::Overlap},
 };
 
 /// The row's phase-correlation function at whole steps from −SHARP to SHARP, as a line exposed in no time would meet it,
@@ -143,31 +139,22 @@ impl Tracker<'_> {
             return None;
         }
         let width = pixels.len();
-        let stride = i32::from(self.config.stride);
-        let whole = nearest_step(shift_px, stride);
-        let overlap = Overlap::new(width, whole)?;
-        let coefficients = part(self.storage.coefficients, row, width)?;
-        let (product, _) = P::part_sums(
-            self.config.kernel,
-            pixels.get(overlap.line)?,
-            coefficients,
-            overlap.reference.start,
-        );
-        let product = product * self.to_reference;
+        let stride = f32::from(self.config.stride);
+        let (whole, product) = self.nearest_product(row, pixels, shift_px)?;
         let mut q = self.correlation_function(row, width)?;
         self.paths.note_repetition(&q);
         if self.stage == Stage::Tracking {
             table.drop_own_noise(&mut q, self.recipe.level, self.recipe.stride);
         }
         let own_px2 = self.storage.learning.get(row).and_then(|l| l.smear_px2());
-        let step = 1.0 / stride as f32;
+        let step = 1.0 / stride;
         let response = Response {
             q: self.paths.sharpened(&q, own_px2),
             path: path.map(|s| s * step),
         };
         let least = LEAST_SLOPE * 0.5 * (q[LAGS + 1] - q[LAGS - 1]);
         let near = (shift_px - whole as f32) * step;
-        let unsmeared_px = whole as f32 + response.solve(product, near, least)? * stride as f32;
+        let unsmeared_px = whole as f32 + response.solve(product, near, least)? * stride;
         ((unsmeared_px - shift_px).abs() < MOST_PX).then_some(unsmeared_px)
     }
 
