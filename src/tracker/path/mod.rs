@@ -90,6 +90,10 @@ impl Paths {
             true => 0.0,
             false => timing.exposure_ns() as f32 / line_ns,
         };
+        Self::unlearned(exposure_rows, line_ns, stride)
+    }
+
+    fn unlearned(exposure_rows: f32, line_ns: f32, stride: u8) -> Self {
         Self {
             exposure_rows,
             line_ns,
@@ -110,16 +114,10 @@ impl Paths {
 
     pub(super) fn relearn(&mut self) {
         *self = Self {
-            oscillation: Oscillation::new(self.exposure_rows, self.exposure_rows.clamp(8.0, 64.0)),
-            ahead: Ahead::default(),
-            repeats: 0.0,
+            start_ns: self.start_ns,
             slips: self.slips,
-            points: [[0.0; 2]; SAMPLES],
-            histogram: [0.0; BINS],
-            sharpen: [[0.0; SHARPEN + 1]; 3],
-            usual_px2: 0.0,
-            frames: 0.0,
-            ..*self
+            learned: self.learned,
+            ..Self::unlearned(self.exposure_rows, self.line_ns, self.stride)
         };
     }
 
