@@ -2,6 +2,13 @@
 
 use host_sim::calibrate::study::{self, Outcome, Tally, condition};
 
+/// So many recordings of the condition of that name, from a seed on.
+fn tally(name: &str, seed: u64, recordings: u64) -> Tally {
+    let all = condition::all();
+    let condition = all.iter().find(|c| c.name == name).expect(name);
+    Tally::of(condition, seed, recordings).unwrap()
+}
+
 /// One recording each, not of the study's own seeds. Right is within 4 stated standard deviations: true values would
 /// leave that once in 16 000 recordings; the seed is fixed, so this run always says the same.
 #[test]
@@ -41,10 +48,7 @@ fn the_hard_ones_are_right_or_refused() {
 /// line time must also be as good as without the failed flashes.
 #[test]
 fn failed_flashes_in_one_frame_bend_nothing() {
-    let all = condition::all();
-    let name = "10 % missing, one frame";
-    let condition = all.iter().find(|c| c.name == name).expect(name);
-    let tally = Tally::of(condition, 4100, 20).unwrap();
+    let tally = tally("10 % missing, one frame", 4100, 20);
     assert_eq!(tally.counts, [20, 0, 0], "{:?}", tally.reasons);
     let [error, ..] = tally.rms();
     assert!(error < 2e-5, "{error:.1e} relative");
@@ -54,19 +58,13 @@ fn failed_flashes_in_one_frame_bend_nothing() {
 /// met in full. Of these eight recordings one was 4.1 stated deviations off.
 #[test]
 fn few_places_of_the_period_are_not_trusted_too_far() {
-    let all = condition::all();
-    let name = "437.21 Hz: 17 places in 17 frames";
-    let condition = all.iter().find(|c| c.name == name).expect(name);
-    let tally = Tally::of(condition, 41_000, 8).unwrap();
+    let tally = tally("437.21 Hz: 17 places in 17 frames", 41_000, 8);
     assert_eq!(tally.counts, [8, 0, 0], "{:?}", tally.reasons);
 }
 
 /// Three places and less than two periods: a picture that is smooth is enough. Of these four recordings some were refused.
 #[test]
 fn a_mains_lamp_of_three_places_is_calibrated_on_a_plain_scene() {
-    let all = condition::all();
-    let name = "mains lamp, 30 % flicker";
-    let condition = all.iter().find(|c| c.name == name).expect(name);
-    let tally = Tally::of(condition, 7000, 4).unwrap();
+    let tally = tally("mains lamp, 30 % flicker", 7000, 4);
     assert_eq!(tally.counts, [4, 0, 0], "{:?}", tally.reasons);
 }
