@@ -11,7 +11,7 @@ cd "$(dirname "$0")/.."
 
 runs=${1:-10}
 rowtone=${ROWTONE:-target/release/rowtone}
-[ -x "$rowtone" ] || cargo build --release --locked -q -p host-sim
+[ -x "$rowtone" ] || cargo build --release --locked -q -p rowtone-cli
 clip=${CLIP:-}
 if [ -z "$clip" ]; then
     clip=$(mktemp --suffix=.y4m)

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Measures the figures in README.md again and writes them, and the picture in docs/, anew.
 
-    cargo build --release -p host-sim && python3 tools/readme-figures.py
+    cargo build --release -p rowtone-cli && python3 tools/readme-figures.py
 
 What stands between <!-- NAME --> and <!-- /NAME --> in README.md is replaced.
 """

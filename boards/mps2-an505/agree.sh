@@ -10,7 +10,7 @@
 # line and a hop of 0.5 s have time for: 150 MHz, 1.6 cycles an instruction.
 set -euo pipefail
 root=$(cd "$(dirname "$0")/../.." && pwd)
-rowtone() { (cd "$root" && cargo run --quiet --release -p host-sim -- "$@"); }
+rowtone() { (cd "$root" && cargo run --quiet --release -p rowtone-cli -- "$@"); }
 
 if [ $# = 0 ]; then
     folder=$(mktemp -d)

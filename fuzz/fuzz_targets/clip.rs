@@ -1,8 +1,8 @@
-//! `host_sim::input`: any bytes as a Y4M stream, behind a right header and without one, and as frame times.
+//! `rowtone_clip`: any bytes as a Y4M stream, behind a right header and without one, and as frame times.
 #![no_main]
 
-use host_sim::input::pts;
-use host_sim::input::y4m::{Next, Reader};
+use rowtone_clip::pts;
+use rowtone_clip::y4m::{Next, Reader};
 use libfuzzer_sys::fuzz_target;
 
 /// Reads until the end, and checks that what is called a frame is one.

@@ -1,44 +1,63 @@
-//! The host's side of rowtone: a simulated camera at a simulated machine, video files, and the
-//! command `rowtone`.
+//! A simulated rolling-shutter camera that looks at a simulated machine.
 //!
-//! The core (package `rowtone`) knows no file, no serial port and no clock; all of that is here. A
-//! recording goes through it in this order:
+//! Contract: a [`Config`] is plain data; [`Camera::new`] checks it once and prepares everything
+//! that does not depend on time; after that a frame is a function of its number alone, so frames
+//! may be rendered in any order or on several threads, and the same configuration gives the same
+//! bytes every time. The true displacement is known at any instant ([`Camera::displacement_px`])
+//! and as a row of the camera saw it ([`Camera::row_truth`]).
 //!
-//! - [`sim`]: a simulated rolling-shutter camera, with the truth about what it saw;
-//! - [`input`]: videos and the camera options;
-//! - [`tracking`]: frames to displacements, on a thread of its own ([`ring`] is between threads);
-//! - [`analysis`]: displacements to reports, in the memory that [`memory`] lends;
-//! - [`output`]: reports, displacements and pictures; [`serial`]: serial ports;
-//!   [`sender`]: a board's end of one;
-//! - [`calibrate`]: what a flashing light tells about a camera; [`linear`]: small linear algebra;
-//! - [`line_scenes`]: recordings with known motion through the tracker, for the line engine's figures;
-//! - [`spectrum_scenes`]: random displacement samples with known tones, for the spectrum's figures;
-//! - [`restore`]: gaps filled, for the ear; [`methods`]: the thesis's methods and others, to compare with;
-//!   [`experiments`]: the thesis's chapter 5 again; [`figure`]: drawings for both;
-//! - [`commands`]: one file a command, each with its options and what it does;
-//! - [`failure`]: what every command says, and exits with, when it cannot go on.
-//! - [`mod@line`] follows a port that comes and goes, and [`receiver`] understands what it says; [`gateway`]:
-//!   many lines to an MQTT broker.
+//! What a row goes through, in the order of the physics:
+//!
+//! 1. [`scene`]: how much light each point of the object reflects, as a periodic strip;
+//! 2. [`texture`]: blurred by lens and pixel area, kept eight times finer than the pixels;
+//! 3. [`exposure`]: integrated over the row's own exposure interval while the object moves
+//!    ([`motion`]) and the light changes ([`light`]);
+//! 4. [`noise`]: shot noise, read noise, quantisation, saturation.
+//!
+//! [`schedule`] says when each frame starts, which are lost and which come late; [`crlb`] how well
+//! any estimator could know the displacement of a row; [`truth`] writes it all down.
+//!
+//! ```
+//! use host_sim::{Camera, Config, Tone};
+//!
+//! let mut config = Config::default();
+//! config.sensor.cols = 64;
+//! config.sensor.rows = 32;
+//! config.frames = 3;
+//! config.motion.tones.push(Tone { hz: 49.2, amplitude_px: 0.4, phase_rad: 0.3 });
+//! let camera = Camera::new(config)?;
+//! for frame in camera.frames() {
+//!     let line = frame.line(0).expect("the frame has rows");
+//!     assert_eq!(line.pixels.len(), 64);
+//! }
+//! # Ok::<(), host_sim::SimError>(())
+//! ```
 
-pub mod analysis;
-pub mod calibrate;
-pub mod commands;
-pub mod experiments;
-pub mod failure;
-pub mod figure;
-pub mod gateway;
-pub mod input;
-pub mod line;
-pub mod line_scenes;
-pub mod linear;
-pub mod memory;
-pub mod methods;
-pub mod output;
-pub mod receiver;
-pub mod restore;
-pub mod ring;
-pub mod sender;
-pub mod serial;
-pub mod sim;
-pub mod spectrum_scenes;
-pub mod tracking;
+pub mod camera;
+pub mod config;
+pub mod crlb;
+mod error;
+pub mod exposure;
+mod frame;
+pub mod light;
+pub mod motion;
+pub mod noise;
+pub mod parallel;
+pub mod preset;
+pub mod scene;
+pub mod schedule;
+mod sound;
+pub mod texture;
+pub mod truth;
+pub mod y4m;
+
+pub use camera::{Camera, RowTruth};
+pub use config::{Config, Disturbances, Faults, Hand, Optics, RateChange, Rect, Sensor};
+pub use error::SimError;
+pub use frame::{Frame, PixelBuffer};
+pub use light::{Flicker, Led, Light};
+pub use motion::{Chirp, Motion, Step, Tone};
+pub use preset::Preset;
+pub use scene::Scene;
+pub use sound::Sound;
+pub use truth::Truth;

@@ -1,0 +1,267 @@
+//! `rowtone analyze`: the tones of a recording, window by window.
+
+use std::path::PathBuf;
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use clap::ValueEnum;
+use rowtone::report::{MAX_PEAKS, Report};
+use rowtone::wire::{Message, text as wire_text};
+
+use crate::output::Out;
+use crate::output::progress::Progress;
+use rowtone_clip::{CameraArgs, Feed};
+use rowtone_failure::Failure;
+use rowtone_measure::analysis::{Analysis, Event, Plan, Settings};
+use rowtone_measure::tracking::Shifts;
+use rowtone_plot::Picture;
+use rowtone_report::zone::ZoneLimits;
+use rowtone_report::{json, text};
+use rowtone_serial::port::PortName;
+use rowtone_serial::sender::Sender;
+
+/// Options of `rowtone analyze`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  \
+    rowtone analyze clip.y4m --line-time-us 18.9 --exposure-us 500 --format json\n  \
+    ffmpeg -i clip.mp4 -f yuv4mpegpipe - | rowtone analyze - --line-time-us 18.9")]
+pub struct Args {
+    #[command(flatten)]
+    camera: CameraArgs,
+    /// Length of a window, s
+    #[arg(long, value_name = "S", default_value_t = 1.0, value_parser = seconds, allow_negative_numbers = true)]
+    window: f64,
+    /// From one window to the next, s [default: half a window]
+    #[arg(long, value_name = "S", value_parser = seconds, allow_negative_numbers = true)]
+    hop: Option<f64>,
+    /// Most peaks reported
+    #[arg(long, value_name = "N", default_value_t = 8,
+          value_parser = clap::value_parser!(u8).range(1..=MAX_PEAKS as i64))]
+    max_peaks: u8,
+    /// Lowest frequency looked for, Hz [default: one period a window]
+    #[arg(long, value_name = "F", value_parser = hertz, allow_negative_numbers = true)]
+    min_hz: Option<f64>,
+    /// Highest frequency looked for, Hz [default: 2000; half the frame rate with --global-shutter]
+    #[arg(long, value_name = "F", value_parser = hertz, allow_negative_numbers = true)]
+    max_hz: Option<f64>,
+    /// Where the zones B, C and D of ISO 20816 begin for this machine, mm/s RMS: adds its zone
+    #[arg(long, value_name = "B,C,D", requires = "um_per_px")]
+    zone_limits: Option<ZoneLimits>,
+    /// Format of the reports on standard output
+    #[arg(long, value_enum, default_value = "text")]
+    format: Format,
+    /// Also sends every report to a serial port, as a board would
+    #[arg(long, value_name = "PORT[:BAUD]")]
+    serial: Option<PortName>,
+    /// Also draws spectrum, displacement and spectrogram
+    #[arg(long, value_name = "FILE.svg|.png")]
+    plot: Option<PathBuf>,
+}
+
+/// Formats of the reports.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Format {
+    Text,
+    Json,
+    Wire,
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    in_range(text, 0.001, 3600.0, "s")
+}
+
+fn hertz(text: &str) -> Result<f64, String> {
+    in_range(text, 1e-3, 1e6, "Hz")
+}
+
+fn in_range(text: &str, low: f64, high: f64, unit: &str) -> Result<f64, String> {
+    let number = text.parse().ok();
+    number
+        .filter(|x: &f64| (low..=high).contains(x))
+        .ok_or_else(|| format!("want a number from {low} to {high} {unit}"))
+}
+
+/// Measures the recording and says what vibrates.
+///
+/// # Errors
+/// [`Failure`] as every command; reports of what was measured before come out all the same.
+pub fn run(args: &Args) -> Result<(), Failure> {
+    if let (Some(min), Some(max)) = (args.min_hz, args.max_hz)
+        && min >= max
+    {
+        return Err(Failure::usage(format!(
+            "--min-hz {min} must be below --max-hz {max}"
+        )));
+    }
+    // A wrong ending is said before anything is measured.
+    args.plot
+        .as_deref()
+        .map_or(Ok(()), rowtone_plot::check_ending)?;
+    let session = session();
+    let serial = args.serial.as_ref().map(|port| {
+        // What comes through a pipe may be live, and does not wait.
+        let may_wait = !args.camera.is_pipe();
+        Sender::open(port, session, &as_a_board_says(args), may_wait)
+    });
+    let serial = serial.transpose()?;
+    let feed = Feed::open(&args.camera)?;
+    let plan = Plan::new(
+        &feed.camera,
+        &Settings {
+            window_s: args.window,
+            hop_s: args.hop.unwrap_or(args.window / 2.0),
+            max_peaks: args.max_peaks.into(),
+            min_hz: args.min_hz,
+            max_hz: args.max_hz,
+            um_per_px: args.camera.um_per_px,
+        },
+    )?;
+    let shifts = Shifts::start(feed, Some(plan.groups()))?;
+    let picture = args.plot.clone().map(|path| {
+        Picture::new(rowtone_plot::Settings {
+            path,
+            title: title(&shifts),
+            band_hz: (args.min_hz.unwrap_or(0.0), plan.max_hz()),
+            exposure_s: f64::from(shifts.camera.timing.exposure_ns()) * 1e-9,
+            one_a_frame: args.camera.global_shutter,
+        })
+    });
+    let mut outlets = Outlets {
+        format: args.format,
+        zone_limits: args.zone_limits,
+        progress: Progress::new(shifts.frames),
+        out: Out::default(),
+        serial,
+        picture,
+        session,
+        reports: 0,
+    };
+    let mut memory = plan.memory();
+    let mut analysis = Analysis::new(shifts, &plan, &mut memory)?;
+    let outcome = analysis.run(|event| outlets.hear(event));
+    if outcome == Err(Failure::OutputClosed) {
+        return outcome;
+    }
+    if let Some(warning) = analysis.warning() {
+        outlets.progress.note(warning);
+    }
+    let nothing = outlets.reports == 0;
+    let closed = outlets.close();
+    outcome.and(closed)?;
+    if nothing {
+        return Err(Failure::input(format!(
+            "{}: no row could be measured: the picture has too little texture across",
+            args.camera.name()
+        )));
+    }
+    Ok(())
+}
+
+/// The options that are a board's settings too.
+fn as_a_board_says(args: &Args) -> rowtone::settings::Settings {
+    rowtone::settings::Settings {
+        window_s: args.window as f32,
+        hop_s: args.hop.unwrap_or(args.window / 2.0) as f32,
+        max_peaks: args.max_peaks,
+        um_per_px: args.camera.um_per_px.map(|scale| scale as f32),
+        min_hz: args.min_hz.map(|hz| hz as f32),
+        max_hz: args.max_hz.map(|hz| hz as f32),
+        ..rowtone::settings::Settings::default()
+    }
+}
+
+fn title(shifts: &Shifts) -> String {
+    let (part, fps) = (shifts.part, shifts.camera.fps);
+    let (width, height) = (part.width, part.height);
+    format!("{}: {width} x {height} px at {fps:.2} fps", shifts.name)
+}
+
+/// A number that differs from run to run, so that a receiver knows a new run from lost reports.
+fn session() -> u32 {
+    SystemTime::now()
+        .duration_since(UNIX_EPOCH)
+        .map_or(0, |since| since.as_secs() as u32)
+}
+
+/// Where reports go.
+struct Outlets {
+    format: Format,
+    zone_limits: Option<ZoneLimits>,
+    progress: Progress,
+    out: Out,
+    serial: Option<Sender>,
+    picture: Option<Picture>,
+    session: u32,
+    reports: u64,
+}
+
+impl Outlets {
+    fn hear(&mut self, event: Event<'_>) -> Result<(), Failure> {
+        match event {
+            Event::Frame(start_ns) => {
+                self.progress.step();
+                if let Some(picture) = &mut self.picture {
+                    picture.start(start_ns);
+                }
+            }
+            Event::Sample(sample) => {
+                if let Some(picture) = &mut self.picture {
+                    picture.sample(sample);
+                }
+            }
+            Event::Report(report) => self.report(report)?,
+        }
+        Ok(())
+    }
+
+    /// Hands a report on, as soon as it is known.
+    fn report(&mut self, report: &Report) -> Result<(), Failure> {
+        self.reports += 1;
+        if let Some(picture) = &mut self.picture {
+            picture.report(report);
+        }
+        let sentence = if self.serial.is_some() || self.format == Format::Wire {
+            self.sentence(report)
+        } else {
+            None
+        };
+        if let (Some(serial), Some(_)) = (&mut self.serial, &sentence)
+            && let Some(complaint) = serial.send(report)
+        {
+            self.progress.note(&complaint);
+        }
+        let out = &mut self.out;
+        self.progress.aside(|| match self.format {
+            Format::Text => out.line(&text::zoned(report, self.zone_limits.as_ref())),
+            Format::Json => out.line(&json::zoned(report, self.zone_limits.as_ref())),
+            Format::Wire => sentence.map_or(Ok(()), |s| out.line(s.trim_end_matches('\n'))),
+        })
+    }
+
+    /// The report as a board would send it; `None` with a note when it has a number that no wire takes.
+    fn sentence(&self, report: &Report) -> Option<String> {
+        let mut sentence = String::new();
+        let message = Message::Report {
+            session: self.session,
+            report: report.clone(),
+        };
+        match wire_text::encode(&message, &mut sentence) {
+            Ok(()) => Some(sentence),
+            Err(error) => {
+                self.progress
+                    .note(&format!("report {} is not sent: {error}", report.seq));
+                None
+            }
+        }
+    }
+
+    /// Writes the picture and waits for the serial port.
+    fn close(self) -> Result<(), Failure> {
+        let drawn = self.picture.map_or(Ok(()), |picture| picture.save());
+        let sent = self.serial.map_or(Ok(None), Sender::finish);
+        drawn?;
+        if let Some(note) = sent? {
+            self.progress.note(&note);
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,203 @@
+//! `rowtone calibrate`: the camera's timing, from the stripes that a flashing light makes.
+
+mod pictures;
+mod report;
+
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+use pictures::{each_picture, full_scale};
+use rowtone_calibrate::rows::{Collector, Recording};
+use rowtone_calibrate::{Light, calibrate_with_stripes, plot, vibration};
+use rowtone_clip::Rect;
+use rowtone_failure::Failure;
+
+/// Standard deviation of the mains frequency, relative: ±0.03 Hz of 50, what large grids keep.
+const MAINS_RELATIVE_SD: f64 = 6e-4;
+
+/// Options of `rowtone calibrate`.
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "How precise on simulated cameras (one second of 480 rows): LED 1e-6; mains 6e-4,\nthe mains' own; unknown light 2e-5 by the camera's clock; a tone of 0.4 px 1e-4, of 0.05 px 1e-3.\ndocs/results.md says what makes each ambiguous.\n\nExamples:\n  rowtone calibrate led.y4m --led-hz 1000 -o calibration.toml\n  rowtone calibrate picture.png --led-hz 1000 --fps 29.97 --plot stripes.svg\n  rowtone calibrate one.jpg two.jpg three.jpg --led-hz 1000\n  rowtone calibrate lamp.y4m --mains 50"
+)]
+#[command(group(clap::ArgGroup::new("light").required(true).args(["led_hz", "mains", "unknown_light", "from_vibration"])))]
+pub struct Args {
+    /// A Y4M video (`-` for standard input), or PNG or JPEG pictures of the same scene
+    #[arg(required = true)]
+    pub input: Vec<String>,
+    /// An LED flashes at this frequency, Hz
+    #[arg(long, value_name = "F")]
+    pub led_hz: Option<f64>,
+    /// Share of its period that the LED is on: only so are exposure and on-time told apart
+    #[arg(long, value_name = "D", default_value_t = 0.5, requires = "led_hz")]
+    pub led_duty: f64,
+    /// A lamp on mains of this frequency, Hz: it flickers at twice that
+    #[arg(long, value_name = "50|60", value_parser = mains)]
+    pub mains: Option<u32>,
+    /// A steady light of unknown frequency: needs frames at two rates (with --pts), or --about-hz
+    #[arg(long)]
+    pub unknown_light: bool,
+    /// No light but a steady machine tone; its frequency with --about-hz, exact with --tone-hz
+    #[arg(long)]
+    pub from_vibration: bool,
+    /// About the frequency of the unknown light or tone, to a fraction of the frame rate
+    #[arg(long, value_name = "F")]
+    pub about_hz: Option<f64>,
+    /// The exact frequency of the machine tone, Hz
+    #[arg(
+        long,
+        value_name = "F",
+        requires = "from_vibration",
+        conflicts_with = "about_hz"
+    )]
+    pub tone_hz: Option<f64>,
+    /// Frame rate, Hz [default: the file's]
+    #[arg(long, value_name = "F")]
+    pub fps: Option<f64>,
+    /// Start of exposure of every frame: timecode format v2, ms
+    #[arg(long, value_name = "FILE")]
+    pub pts: Option<PathBuf>,
+    /// Part of the picture to use, px; read-out and blank time are told of the whole picture all the same
+    #[arg(long, value_name = "X,Y,W,H")]
+    pub roi: Option<Rect>,
+    /// Most frames to use, from the start
+    #[arg(long, value_name = "N", default_value_t = 120)]
+    pub frames: usize,
+    /// What to print
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    pub format: Format,
+    /// Writes the calibration as TOML, for --calibration of other commands
+    #[arg(short, long, value_name = "FILE")]
+    pub output: Option<PathBuf>,
+    /// Draws the stripes, the fit over them and what it leaves (SVG)
+    #[arg(long, value_name = "FILE")]
+    pub plot: Option<PathBuf>,
+}
+
+/// What to print.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Format {
+    /// For people.
+    Text,
+    /// One object.
+    Json,
+}
+
+fn mains(text: &str) -> Result<u32, String> {
+    match text {
+        "50" => Ok(50),
+        "60" => Ok(60),
+        _ => Err("want 50 or 60".to_owned()),
+    }
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// [`Failure`] for an input that cannot be read and for stripes that give no calibration to rely on.
+pub fn run(args: &Args) -> Result<(), Failure> {
+    for (name, value) in [
+        ("--led-hz", args.led_hz),
+        ("--about-hz", args.about_hz),
+        ("--tone-hz", args.tone_hz),
+        ("--fps", args.fps),
+    ] {
+        if value.is_some_and(|v| !v.is_finite() || v <= 0.0) {
+            return Err(Failure::usage(format!("{name}: want a number above 0")));
+        }
+    }
+    if !(args.led_duty > 0.0 && args.led_duty < 1.0) {
+        return Err(Failure::usage(
+            "--led-duty: want a number between 0 and 1, such as 0.5".to_owned(),
+        ));
+    }
+    let name = args.input.join(" ");
+    let recording = if args.from_vibration {
+        let mut pictures = Vec::new();
+        let info = each_picture(args, |picture, width| {
+            pictures.push((picture.to_vec(), width))
+        })?;
+        let rows = vibration::displacements(&pictures)
+            .map_err(|why| Failure::input(format!("{name}: {why}")))?;
+        Recording {
+            rows,
+            times_s: info.times_s,
+            fps: info.fps,
+            saturated_share: 0.0,
+            black: None,
+            picture_rows: info.picture_rows,
+        }
+    } else {
+        let mut collector = None;
+        let info = each_picture(args, |picture, width| {
+            collector
+                .get_or_insert_with(|| Collector::new(width, full_scale(picture)))
+                .push(picture.chunks_exact(width));
+        })?;
+        let Some(collector) = collector else {
+            return Err(Failure::input(format!("{name}: no frame in it")));
+        };
+        Recording {
+            picture_rows: info.picture_rows,
+            ..collector.finish(info.times_s, info.fps)
+        }
+    };
+    let (calibration, stripes) = calibrate_with_stripes(&recording, light(args))
+        .map_err(|refusal| Failure::input(format!("{name}: {refusal}")))?;
+    if let Some(path) = &args.output {
+        write_file(path, &calibration.to_toml())?;
+    }
+    if let Some(path) = &args.plot {
+        write_file(
+            path,
+            &plot::stripes(&recording.rows, &stripes.fit, calibration.light_hz),
+        )?;
+    }
+    let text = match args.format {
+        Format::Text => report::text(&calibration),
+        Format::Json => {
+            serde_json::to_string(&calibration)
+                .map_err(|e| Failure::input(format!("calibration: {e}")))?
+                + "\n"
+        }
+    };
+    if args.format == Format::Text {
+        for warning in &calibration.warnings {
+            eprintln!("rowtone: warning: {warning}");
+        }
+    }
+    io::stdout()
+        .write_all(text.as_bytes())
+        .map_err(|e| Failure::writing("standard output", &e))
+}
+
+/// What the options say of the light.
+fn light(args: &Args) -> Light {
+    match (args.led_hz, args.mains, args.tone_hz) {
+        (Some(hz), _, _) => Light::Known {
+            hz,
+            hz_sd: 0.0,
+            duty: Some(args.led_duty),
+        },
+        (_, Some(mains), _) => {
+            let hz = 2.0 * f64::from(mains);
+            Light::Known {
+                hz,
+                hz_sd: MAINS_RELATIVE_SD * hz,
+                duty: None,
+            }
+        }
+        (_, _, Some(hz)) => Light::Known {
+            hz,
+            hz_sd: 0.0,
+            duty: None,
+        },
+        _ => Light::Unknown {
+            about_hz: args.about_hz,
+        },
+    }
+}
+
+fn write_file(path: &Path, text: &str) -> Result<(), Failure> {
+    std::fs::write(path, text).map_err(|e| Failure::writing(&path.display().to_string(), &e))
+}

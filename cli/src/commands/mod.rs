@@ -1,0 +1,118 @@
+//! The commands, one file each.
+//!
+//! A command is a file `commands/<name>.rs` with `#[derive(clap::Args)] pub struct Args` and
+//! `pub fn run(args: &Args) -> Result<(), Failure>`, and one variant of `Command`. Results go to
+//! standard output; everything else (progress, warnings, the one line of a [`Failure`]) goes to
+//! standard error.
+
+use std::ffi::OsString;
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+use rowtone_failure::Failure;
+
+pub mod analyze;
+pub mod calibrate;
+pub mod compare;
+pub mod demo;
+pub mod displacement;
+pub mod experiments;
+pub mod gateway;
+pub mod monitor;
+pub mod simulate;
+pub mod sweep;
+
+/// Measures vibration with a rolling-shutter camera: every row of a frame is a sample in time.
+#[derive(Debug, Parser)]
+#[command(name = "rowtone", version, disable_help_subcommand = true)]
+#[command(after_help = "Without a command, `rowtone` runs `rowtone demo`.")]
+struct Cli {
+    #[command(subcommand)]
+    command: Option<Command>,
+}
+
+/// What `rowtone` can do.
+#[derive(Debug, Subcommand)]
+#[expect(
+    clippy::large_enum_variant,
+    reason = "there is one, for as long as the program runs"
+)]
+enum Command {
+    /// A simulated camera looks at a simulated machine; its peaks appear beside the truth
+    Demo(demo::Args),
+    /// Says what vibrates, window by window
+    Analyze(analyze::Args),
+    /// Writes the motion over time as CSV, NPY or WAV
+    Displacement(displacement::Args),
+    /// Decodes what a board sends over a serial port
+    Monitor(monitor::Args),
+    /// Sends the reports of many boards to an MQTT broker
+    Gateway(gateway::Args),
+    /// Writes a simulated clip, with the truth beside it
+    Simulate(simulate::Args),
+    /// Line time, read-out, blank time and exposure of a camera, from a flashing light
+    Calibrate(calibrate::Args),
+    /// Measures the project's own figures anew, from a seed
+    Sweep(sweep::Args),
+    /// Runs every method on the same simulated clip and prints one table
+    Compare(compare::Args),
+    /// Makes the tables and sounds of docs/results.md anew
+    Experiments(experiments::Args),
+}
+
+fn run(command: &Command) -> Result<(), Failure> {
+    match command {
+        Command::Demo(args) => demo::run(args),
+        Command::Analyze(args) => analyze::run(args),
+        Command::Displacement(args) => displacement::run(args),
+        Command::Monitor(args) => monitor::run(args),
+        Command::Gateway(args) => gateway::run(args),
+        Command::Simulate(args) => simulate::run(args),
+        Command::Calibrate(args) => calibrate::run(args),
+        Command::Sweep(args) => sweep::run(args),
+        Command::Compare(args) => compare::run(args),
+        Command::Experiments(args) => experiments::run(args),
+    }
+}
+
+/// The whole program: parses `args` (the program's name first), runs the command, prints the one
+/// line of a failure, and says what to exit with.
+pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
+    let cli = match Cli::try_parse_from(args) {
+        Ok(cli) => cli,
+        Err(error) => return answer(&error),
+    };
+    let command = cli.command.unwrap_or(Command::Demo(demo::Args::default()));
+    match run(&command) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => report(&failure),
+    }
+}
+
+/// Prints why the command stopped.
+fn report(failure: &Failure) -> ExitCode {
+    if *failure != Failure::OutputClosed {
+        eprintln!("rowtone: {failure}");
+    }
+    ExitCode::from(failure.status())
+}
+
+/// What the parser of the command line has to say: help and version on standard output, an error as
+/// one line.
+fn answer(error: &clap::Error) -> ExitCode {
+    if !error.use_stderr() {
+        // A closed pipe (`rowtone --help | head -1`) is no error.
+        let _ = error.print();
+        return ExitCode::SUCCESS;
+    }
+    let text = error.to_string();
+    // clap's message, then its usage and hint paragraphs: keep what it says and how to go on.
+    let what = text.split("\n\nUsage:").next().unwrap_or(&text);
+    let what = what.strip_prefix("error: ").unwrap_or(what);
+    let what = what
+        .split("\n\nFor more information")
+        .next()
+        .unwrap_or(what);
+    report(&Failure::usage(format!("{what}; try --help")))
+}

@@ -1,0 +1,238 @@
+//! The live view: what it knows, and its loop.
+
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender};
+use std::time::{Duration, Instant};
+
+use ratatui::crossterm::event::{self, Event as Input, KeyCode, KeyEventKind, KeyModifiers};
+use rowtone::report::Report;
+use rowtone::wire::Arrival;
+
+use super::draw::draw;
+use super::history::History;
+use super::log::Log;
+use super::went_away;
+use rowtone_failure::Failure;
+use rowtone_serial::line::Event;
+use rowtone_serial::receiver::{Heard, Receiver as Board};
+
+/// The screen is drawn this often at the most.
+const FRAME: Duration = Duration::from_millis(100);
+
+/// All that is shown.
+pub(super) struct View<'a> {
+    pub(super) port: &'a str,
+    /// Why the line is not there, if it is not.
+    pub(super) gone: Option<String>,
+    /// Whether to end when the line goes away.
+    once: bool,
+    /// What the board last said that is no report.
+    pub(super) said: String,
+    pub(super) session: u32,
+    pub(super) history: History,
+    pub(super) board: Board,
+}
+
+pub(super) fn run(
+    port: &str,
+    once: bool,
+    events: &Receiver<Event>,
+    commands: &Sender<Vec<u8>>,
+    log: Option<Log>,
+) -> Result<(), Failure> {
+    let mut terminal = ratatui::try_init()
+        .map_err(|error| Failure::input(format!("terminal: cannot be used: {error}")))?;
+    let mut view = View {
+        port,
+        gone: None,
+        once,
+        said: String::new(),
+        session: 0,
+        history: History::default(),
+        board: Board::default(),
+    };
+    let done = view.follow(&mut terminal, events, commands, log);
+    ratatui::restore();
+    done
+}
+
+impl View<'_> {
+    fn follow(
+        &mut self,
+        terminal: &mut ratatui::DefaultTerminal,
+        events: &Receiver<Event>,
+        commands: &Sender<Vec<u8>>,
+        mut log: Option<Log>,
+    ) -> Result<(), Failure> {
+        let failed = |error| Failure::writing("terminal", &error);
+        loop {
+            terminal.draw(|frame| draw(frame, self)).map_err(failed)?;
+            let next = Instant::now() + FRAME;
+            loop {
+                let wait = next.saturating_duration_since(Instant::now());
+                match events.recv_timeout(wait) {
+                    Ok(event) => self.take(event, log.as_mut())?,
+                    Err(RecvTimeoutError::Timeout) => break,
+                    // The file has ended; its last picture stays until the user leaves.
+                    Err(RecvTimeoutError::Disconnected) => {
+                        std::thread::sleep(wait);
+                        break;
+                    }
+                }
+                if wait.is_zero() {
+                    break;
+                }
+            }
+            if let Some(command) = self.board.ask(Instant::now()) {
+                let _ = commands.send(command);
+            }
+            while event::poll(Duration::ZERO).map_err(failed)? {
+                if leaves(&event::read().map_err(failed)?) {
+                    return Ok(());
+                }
+            }
+        }
+    }
+
+    fn take(&mut self, event: Event, mut log: Option<&mut Log>) -> Result<(), Failure> {
+        match event {
+            Event::Open => self.gone = None,
+            Event::Gone(why) if self.once => {
+                return Err(went_away(self.port, self.board.counters().reports, &why));
+            }
+            Event::Gone(why) => self.gone = Some(why),
+            Event::End => self.gone = Some("the input has ended".to_owned()),
+            Event::Bytes(bytes) => {
+                let mut heard = vec![];
+                self.board.hear(&bytes, |one| heard.push(one));
+                for one in heard {
+                    match one {
+                        Heard::Report {
+                            session,
+                            report,
+                            arrival,
+                        } => {
+                            if let Some(log) = log.as_deref_mut() {
+                                log.append(session, &report)?;
+                            }
+                            self.report(session, &report, arrival);
+                        }
+                        Heard::Status(status) => {
+                            self.said = format!(
+                                "up {} s, {} reports dropped",
+                                status.uptime_ms / 1000,
+                                status.dropped_reports
+                            );
+                        }
+                        Heard::Reply(reply) => self.said = reply.text.to_string(),
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn report(&mut self, session: u32, report: &Report, arrival: Arrival) {
+        match arrival {
+            // One that came late goes into the log, but would upset the order here.
+            Arrival::Again => return,
+            Arrival::Restarted => self.history.clear(),
+            _ => {}
+        }
+        self.session = session;
+        self.history.push(report);
+    }
+}
+
+fn leaves(input: &Input) -> bool {
+    let Input::Key(key) = input else { return false };
+    let control_c = key.code == KeyCode::Char('c') && key.modifiers.contains(KeyModifiers::CONTROL);
+    key.kind != KeyEventKind::Release
+        && (control_c || matches!(key.code, KeyCode::Char('q') | KeyCode::Esc))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ratatui::{Terminal, backend::TestBackend};
+
+    fn view() -> View<'static> {
+        View {
+            port: "/dev/ttyUSB0",
+            gone: None,
+            once: false,
+            said: String::new(),
+            session: 0,
+            history: History::default(),
+            board: Board::default(),
+        }
+    }
+
+    fn screen(view: &View<'_>, width: u16, height: u16) -> String {
+        let mut terminal = Terminal::new(TestBackend::new(width, height)).unwrap();
+        terminal.draw(|frame| draw(frame, view)).unwrap();
+        terminal.backend().to_string()
+    }
+
+    fn hear(view: &mut View<'_>, report: Report) {
+        let message = rowtone::wire::Message::Report { session: 2, report };
+        let mut line = [0; rowtone::wire::text::MAX_LINE];
+        let line = rowtone::wire::text::encode_to_slice(&message, &mut line).unwrap();
+        view.take(Event::Bytes(line.to_vec()), None).unwrap();
+    }
+
+    #[test]
+    fn the_view_shows_peaks_and_losses() {
+        let mut view = view();
+        assert!(screen(&view, 80, 24).contains("waiting for the first report"));
+        for seq in [3, 4, 6] {
+            let mut report = rowtone_report::example(Some(10.0));
+            report.seq = seq;
+            hear(&mut view, report);
+        }
+        // From too small to be of use to very wide: no panic.
+        for (width, height) in [(1, 1), (20, 5), (80, 24), (120, 40), (160, 50), (300, 100)] {
+            let screen = screen(&view, width, height);
+            if width < 80 {
+                continue;
+            }
+            for part in [
+                "49.2003",
+                "1500.0000",
+                "session 2 #6",
+                "lost 1",
+                "bad frames 0",
+                "3.998",
+                "frames were lost",
+                "2000 Hz",
+                "1000",
+            ] {
+                assert!(screen.contains(part), "{part} in\n{screen}");
+            }
+        }
+        view.gone = Some("Input/output error".to_owned());
+        assert!(screen(&view, 80, 24).contains("away: Input/output error"));
+    }
+
+    /// A bar is as long as the amplitude, to an eighth of a cell.
+    #[test]
+    fn bars_are_in_proportion() {
+        let mut view = view();
+        let mut report = rowtone_report::example(None);
+        report.peaks[0].amplitude_px = 0.8;
+        report.peaks[1].amplitude_px = 0.2;
+        hear(&mut view, report);
+        let screen = screen(&view, 80, 24);
+        let eighths = |hz: &str| -> usize {
+            let line = screen.lines().find(|line| line.contains(hz)).unwrap();
+            let bar = line.chars().skip_while(|c| !"█▉▊▋▌▍▎▏".contains(*c));
+            let bar = bar.take_while(|c| "█▉▊▋▌▍▎▏".contains(*c));
+            bar.map(|c| 0x2590 - c as usize).sum()
+        };
+        let (long, short) = (eighths("49.2003"), eighths("1500.0000"));
+        assert_eq!(long % 8, 0, "the largest fills its bar");
+        assert!(
+            long >= 8 * 12 && short == long / 4,
+            "{long} {short}\n{screen}"
+        );
+    }
+}

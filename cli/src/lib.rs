@@ -1,0 +1,7 @@
+//! The command `rowtone`: its commands and what they print.
+//!
+//! - [`commands`]: one file a command, each with its options and what it does;
+//! - [`output`]: displacements as files, standard output line by line, progress.
+
+pub mod commands;
+pub mod output;

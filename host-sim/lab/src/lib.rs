@@ -1,0 +1,16 @@
+//! The paper laboratory: what shows how well rowtone and others measure, on recordings with known truth.
+//!
+//! - [`methods`]: the thesis's methods and others, to compare with;
+//! - [`experiments`]: the thesis's chapter 5 again; [`figure`]: drawings for both;
+//! - [`line_scenes`]: recordings with known motion through the tracker, for the line engine's figures;
+//! - [`spectrum_scenes`]: random displacement samples with known tones, for the spectrum's figures;
+//! - [`calibrations`]: calibrations of simulated cameras, with the truth;
+//! - [`sound`]: speech and music, and how well a recovered sound agrees with them.
+
+pub mod calibrations;
+pub mod experiments;
+pub mod figure;
+pub mod line_scenes;
+pub mod methods;
+pub mod sound;
+pub mod spectrum_scenes;

@@ -1,0 +1,101 @@
+//! Frame times from a file: timecode format v2, one time in milliseconds a line, as
+//! `rpicam-vid --save-pts` and `mkvextract timestamps_v2` write.
+
+use std::path::Path;
+
+use rowtone_failure::Failure;
+
+/// Reads the start of exposure of every frame, ns.
+///
+/// # Errors
+/// [`Failure::Input`], naming the line, for one that is not a number or not later than the one before,
+/// and for a file without any.
+pub fn read(path: &Path) -> Result<Vec<i64>, Failure> {
+    let name = path.display();
+    let text = std::fs::read_to_string(path)
+        .map_err(|e| Failure::input(format!("{name}: cannot be read: {e}")))?;
+    parse(&text).map_err(|what| Failure::input(format!("{name}: {what}")))
+}
+
+/// Reads the text of such a file.
+///
+/// ```
+/// let times = rowtone_clip::pts::parse("# timecode format v2\n-0.024\n33.341\n").unwrap();
+/// assert_eq!(times, [-24_000, 33_341_000]);
+/// ```
+///
+/// # Errors
+/// What is wrong, in words, with the number of the line.
+pub fn parse(text: &str) -> Result<Vec<i64>, String> {
+    let mut times: Vec<i64> = Vec::new();
+    for (number, line) in (1..).zip(text.lines()) {
+        let line = line.trim();
+        if line.starts_with('#') {
+            if line.contains("format v1") {
+                return Err(format!(
+                    "line {number}: timecode format v1 gives rates, not times: write format v2"
+                ));
+            }
+            continue;
+        }
+        if line.is_empty() {
+            continue;
+        }
+        let milliseconds: f64 = line
+            .parse()
+            .ok()
+            // 126 years either way, so that the time between any two fits as well.
+            .filter(|ms: &f64| ms.abs() < 4e12)
+            .ok_or_else(|| format!("line {number}: {line:?} is not a time in milliseconds"))?;
+        let time = (milliseconds * 1e6).round() as i64;
+        if times.last().is_some_and(|&before| time <= before) {
+            return Err(format!(
+                "line {number}: the time {line} ms is not later than the one before it"
+            ));
+        }
+        times.push(time);
+    }
+    if times.is_empty() {
+        return Err("there is no time in it".to_owned());
+    }
+    Ok(times)
+}
+
+/// The usual time between frames, ns: the median. `None` for fewer than two times.
+pub fn period_ns(times: &[i64]) -> Option<i64> {
+    let mut steps: Vec<i64> = times.windows(2).map(|w| w[1] - w[0]).collect();
+    if steps.is_empty() {
+        return None;
+    }
+    let middle = steps.len() / 2;
+    Some(*steps.select_nth_unstable(middle).1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_the_line_that_is_wrong() {
+        for (text, wrong) in [
+            ("# timecode format v2\n0\n10\nten\n", "line 4"),
+            ("0\n10\n10\n", "line 3"),
+            ("0\n\n-1\n", "line 3"),
+            ("0\nNaN\n", "line 2"),
+            ("0\ninf\n", "line 2"),
+            ("-8e12\n8e12\n", "line 1"),
+            ("# timecode format v1\n0\n", "line 1"),
+            ("# timecode format v2\n", "no time"),
+        ] {
+            let error = parse(text).unwrap_err();
+            assert!(error.contains(wrong), "{text:?}: {error}");
+        }
+    }
+
+    #[test]
+    fn the_usual_period_is_not_fooled_by_a_lost_frame() {
+        let times = parse("0\n33\n66\n132\n165\n").unwrap();
+        assert_eq!(period_ns(&times), Some(33_000_000));
+        assert_eq!(period_ns(&times[..1]), None);
+    }
+}

@@ -1,0 +1,275 @@
+//! The gateway's configuration: read, and checked as a whole.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+use toml::Spanned;
+
+use rowtone_failure::Failure;
+use rowtone_serial::port::PortName;
+
+/// What to read and where to send it.
+#[derive(Clone, Debug)]
+pub struct Config {
+    /// Where to send it.
+    pub broker: Broker,
+    /// What a message looks like.
+    pub payload: Payload,
+    /// Where reports wait on disk.
+    pub spool: Spool,
+    /// What to read.
+    pub boards: Vec<Board>,
+}
+
+/// An MQTT broker.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Broker {
+    /// Name or address.
+    pub host: String,
+    /// Port; 1883, or 8883 with TLS, where none is given.
+    pub port: Option<u16>,
+    /// Name of this gateway at the broker, unlike that of any other client.
+    pub client_id: String,
+    /// User, where the broker wants one.
+    pub user: Option<String>,
+    /// The user's password.
+    pub password: Option<String>,
+    /// File with the password alone, so that it need not stand in the configuration.
+    pub password_file: Option<PathBuf>,
+    /// TLS, with the authorities whose certificates are trusted (PEM).
+    pub tls_ca: Option<PathBuf>,
+}
+
+/// What a message looks like.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields, tag = "format", rename_all = "lowercase")]
+pub enum Payload {
+    /// A JSON object a report, to `TOPIC/BOARD/report`.
+    Json {
+        /// First part of the topic.
+        topic: String,
+    },
+    /// Sparkplug B, to `spBv1.0/GROUP/DDATA/NODE/BOARD`.
+    Sparkplug {
+        /// Group id.
+        group: String,
+        /// Edge node id.
+        node: String,
+    },
+}
+
+/// Where reports wait on disk.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Spool {
+    /// A directory for this gateway alone.
+    pub dir: PathBuf,
+    /// Most space to take, MB; the oldest reports go when there is more.
+    #[serde(default = "usual_max_mb")]
+    pub max_mb: u32,
+}
+
+fn usual_max_mb() -> u32 {
+    1000
+}
+
+/// One board on a serial line.
+#[derive(Clone, Debug)]
+pub struct Board {
+    /// Its name in topics.
+    pub name: String,
+    /// Where it is.
+    pub port: PortName,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    broker: Broker,
+    payload: Spanned<Payload>,
+    spool: Spanned<Spool>,
+    board: Spanned<Vec<BoardEntry>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct BoardEntry {
+    name: Spanned<String>,
+    port: Spanned<String>,
+}
+
+impl Config {
+    /// Reads the file.
+    ///
+    /// # Errors
+    /// One line that names the file, the line and the key.
+    pub fn read(path: &Path) -> Result<Self, Failure> {
+        let text = std::fs::read_to_string(path).map_err(|error| {
+            Failure::input(format!("{}: cannot be read: {error}", path.display()))
+        })?;
+        Self::parse(&text).map_err(|why| Failure::input(format!("{}:{why}", path.display())))
+    }
+
+    /// Reads the file's text; an error starts with the number of the line.
+    fn parse(text: &str) -> Result<Self, String> {
+        let line = |at: usize| {
+            text.as_bytes()[..at.min(text.len())]
+                .iter()
+                .filter(|&&b| b == b'\n')
+                .count()
+                + 1
+        };
+        let file: File = toml::from_str(text).map_err(|error| {
+            let at = error.span().map_or(text.len(), |span| span.start);
+            format!("{}: {}{}", line(at), key_before(text, at), error.message())
+        })?;
+        let wrong = |at: usize, key: &str, why: &str| Err(format!("{}: {key}: {why}", line(at)));
+
+        let at = file.payload.span().start;
+        let plain = |part: &str| !part.is_empty() && !part.contains(['#', '+', '\0']);
+        match file.payload.get_ref() {
+            Payload::Json { topic } if !plain(topic) => {
+                return wrong(at, "payload.topic", "give a topic without # and +");
+            }
+            Payload::Sparkplug { group, node }
+                if !plain(group) || !plain(node) || group.contains('/') || node.contains('/') =>
+            {
+                return wrong(
+                    at,
+                    "payload.group, payload.node",
+                    "give names without #, + and /",
+                );
+            }
+            _ => {}
+        }
+        if file.spool.get_ref().max_mb == 0 {
+            return wrong(file.spool.span().start, "spool.max_mb", "give at least 1");
+        }
+        if file.broker.password.is_some() && file.broker.password_file.is_some() {
+            let at = text.find("password_file").unwrap_or(0);
+            return wrong(
+                at,
+                "broker.password_file",
+                "give this or broker.password, not both",
+            );
+        }
+        if file.board.get_ref().is_empty() {
+            return wrong(file.board.span().start, "board", "name at least one");
+        }
+        let (mut names, mut ports) = (BTreeSet::new(), BTreeSet::new());
+        let mut boards = vec![];
+        for entry in file.board.into_inner() {
+            let (name_at, port_at) = (entry.name.span().start, entry.port.span().start);
+            let (name, port) = (entry.name.into_inner(), entry.port.into_inner());
+            if !plain(&name) || name.contains(['/', ' ']) {
+                return wrong(
+                    name_at,
+                    "board.name",
+                    "give a name without #, +, / and spaces",
+                );
+            }
+            if !names.insert(name.clone()) {
+                return wrong(name_at, "board.name", &format!("{name} is there twice"));
+            }
+            let port: PortName = match port.parse() {
+                Ok(port) => port,
+                Err(why) => return wrong(port_at, "board.port", &why),
+            };
+            if !ports.insert(port.path.clone()) {
+                return wrong(
+                    port_at,
+                    "board.port",
+                    &format!("{} is there twice", port.path),
+                );
+            }
+            boards.push(Board { name, port });
+        }
+        Ok(Self {
+            broker: file.broker,
+            payload: file.payload.into_inner(),
+            spool: file.spool.into_inner(),
+            boards,
+        })
+    }
+}
+
+/// The key on whose line the fault is, where it is plain to see.
+fn key_before(text: &str, at: usize) -> String {
+    let start = text[..at.min(text.len())]
+        .rfind('\n')
+        .map_or(0, |end| end + 1);
+    let line = text[start..].lines().next().unwrap_or("");
+    match line.split_once('=') {
+        Some((key, _)) => format!("{}: ", key.trim()),
+        None => String::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const RIGHT: &str = r#"
+[broker]
+host = "localhost"
+client_id = "hall-2"
+
+[payload]
+format = "json"
+topic = "plant/vibration"
+
+[spool]
+dir = "/var/lib/rowtone"
+
+[[board]]
+name = "press-3"
+port = "/dev/ttyUSB0:921600"
+
+[[board]]
+name = "press-4"
+port = "/dev/ttyUSB1"
+"#;
+
+    #[test]
+    fn the_usual_file() {
+        let config = Config::parse(RIGHT).unwrap();
+        assert_eq!(config.boards[0].port.baud, 921_600);
+        assert_eq!((config.boards.len(), config.spool.max_mb), (2, 1000));
+    }
+
+    #[test]
+    fn a_fault_names_its_line_and_key() {
+        for (from, to, why) in [
+            ("host =", "hots =", "3: hots: "),
+            ("\"localhost\"", "7", "3: host: "),
+            ("format = \"json\"", "format = \"xml\"", "xml"),
+            (
+                "topic = \"plant/vibration\"",
+                "topic = \"#\"",
+                "6: payload.topic: ",
+            ),
+            (
+                "press-4",
+                "press-3",
+                "18: board.name: press-3 is there twice",
+            ),
+            (
+                "ttyUSB1",
+                "ttyUSB0",
+                "19: board.port: /dev/ttyUSB0 is there twice",
+            ),
+            ("ttyUSB1", "ttyUSB1:0", "19: board.port: "),
+            (
+                "dir = \"/var/lib/rowtone\"",
+                "dir = \"x\"\nmax_mb = 0",
+                "10: spool.max_mb: ",
+            ),
+            ("[spool]", "[spool", "10: "),
+        ] {
+            let error = Config::parse(&RIGHT.replace(from, to)).unwrap_err();
+            assert!(error.contains(why), "{to}: {error}");
+        }
+    }
+}

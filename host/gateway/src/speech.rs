@@ -1,0 +1,193 @@
+//! What is said to the broker besides when: topics and payloads of either format.
+
+use std::collections::BTreeSet;
+
+use super::broker::Will;
+use super::config::{Config, Payload};
+use super::entry::Entry;
+use super::{payload, sparkplug};
+
+/// Older reports are marked as historical (Sparkplug).
+const HISTORICAL_MS: u64 = 10_000;
+
+/// One message to publish.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Said {
+    pub(super) topic: String,
+    pub(super) payload: Vec<u8>,
+    pub(super) retain: bool,
+}
+
+/// Knows what was said on this connection.
+#[derive(Debug)]
+pub(super) struct Speech {
+    payload: Payload,
+    client_id: String,
+    /// Number of the connection.
+    connection: u64,
+    /// Boards whose birth was said (Sparkplug).
+    births: BTreeSet<String>,
+    /// Number of the last message of the node (Sparkplug).
+    seq: u64,
+}
+
+impl Speech {
+    pub(super) fn new(config: &Config) -> Self {
+        Self {
+            payload: config.payload.clone(),
+            client_id: config.broker.client_id.clone(),
+            connection: 0,
+            births: BTreeSet::new(),
+            seq: 0,
+        }
+    }
+
+    /// A new connection begins: what the broker is to say when the gateway dies.
+    pub(super) fn begin(&mut self, connection: u64) -> Will {
+        self.connection = connection;
+        self.births.clear();
+        let last = self.goodbye();
+        Will {
+            topic: last.topic,
+            payload: last.payload,
+            retain: last.retain,
+        }
+    }
+
+    /// What the gateway wants to hear.
+    pub(super) fn subscription(&self) -> Option<String> {
+        match &self.payload {
+            Payload::Json { .. } => None,
+            Payload::Sparkplug { group, node } => Some(format!("spBv1.0/{group}/NCMD/{node}")),
+        }
+    }
+
+    /// The first message of a connection, and what a host gets that asks for births.
+    pub(super) fn hello(&mut self, unix_ms: u64) -> Said {
+        self.births.clear();
+        self.seq = 0;
+        match &self.payload {
+            Payload::Json { topic } => self.state(topic, "online"),
+            Payload::Sparkplug { .. } => {
+                let birth = sparkplug::node_birth(self.connection, unix_ms);
+                self.node("NBIRTH", birth)
+            }
+        }
+    }
+
+    /// The last one. The will is for a gateway that dies; one that ends says so itself.
+    pub(super) fn goodbye(&self) -> Said {
+        match &self.payload {
+            Payload::Json { topic } => self.state(topic, "offline"),
+            Payload::Sparkplug { .. } => {
+                self.node("NDEATH", sparkplug::node_death(self.connection))
+            }
+        }
+    }
+
+    /// A report, after the board's birth where it needs one.
+    pub(super) fn report(&mut self, entry: &Entry, unix_ms: u64) -> (Option<Said>, Said) {
+        if let Payload::Json { topic } = &self.payload {
+            let said = Said {
+                topic: format!("{topic}/{}/report", entry.board),
+                payload: payload::json(entry),
+                retain: false,
+            };
+            return (None, said);
+        }
+        let historical = unix_ms.saturating_sub(entry.unix_ms) > HISTORICAL_MS;
+        let say = |speech: &mut Self, kind| {
+            let payload = sparkplug::board_data(entry, speech.next_seq(), historical);
+            speech.board(kind, &entry.board, payload)
+        };
+        let birth = self.births.insert(entry.board.clone());
+        let birth = birth.then(|| say(self, "DBIRTH"));
+        (birth, say(self, "DDATA"))
+    }
+
+    /// The board's line has gone and all its reports are said.
+    pub(super) fn board_gone(&mut self, board: &str, unix_ms: u64) -> Option<Said> {
+        // Only Sparkplug has births, and a board that was never born does not die.
+        self.births.remove(board).then(|| {
+            let payload = sparkplug::board_death(self.next_seq(), unix_ms);
+            self.board("DDEATH", board, payload)
+        })
+    }
+
+    fn next_seq(&mut self) -> u64 {
+        self.seq = (self.seq + 1) % 256;
+        self.seq
+    }
+
+    fn state(&self, topic: &str, state: &str) -> Said {
+        Said {
+            topic: format!("{topic}/gateway/{}/state", self.client_id),
+            payload: state.as_bytes().to_vec(),
+            retain: true,
+        }
+    }
+
+    fn node(&self, kind: &str, payload: Vec<u8>) -> Said {
+        self.sparkplug(kind, "", payload)
+    }
+
+    fn board(&self, kind: &str, board: &str, payload: Vec<u8>) -> Said {
+        self.sparkplug(kind, &format!("/{board}"), payload)
+    }
+
+    fn sparkplug(&self, kind: &str, board: &str, payload: Vec<u8>) -> Said {
+        let topic = match &self.payload {
+            Payload::Sparkplug { group, node } => format!("spBv1.0/{group}/{kind}/{node}{board}"),
+            Payload::Json { topic } => topic.clone(),
+        };
+        Said {
+            topic,
+            payload,
+            retain: false,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn speech() -> Speech {
+        Speech {
+            payload: Payload::Sparkplug {
+                group: "g".to_owned(),
+                node: "n".to_owned(),
+            },
+            client_id: "c".to_owned(),
+            connection: 0,
+            births: BTreeSet::new(),
+            seq: 0,
+        }
+    }
+
+    #[test]
+    fn a_board_is_born_once_and_dies_once() {
+        let mut speech = speech();
+        assert_eq!(speech.begin(1).topic, "spBv1.0/g/NDEATH/n");
+        assert_eq!(speech.hello(5).topic, "spBv1.0/g/NBIRTH/n");
+        let entry = Entry {
+            unix_ms: 5,
+            board: "b".to_owned(),
+            session: 1,
+            report: rowtone_report::example(None),
+        };
+        assert_eq!(speech.board_gone("b", 6), None);
+        let (birth, data) = speech.report(&entry, 6);
+        assert_eq!(birth.unwrap().topic, "spBv1.0/g/DBIRTH/n/b");
+        assert_eq!(data.topic, "spBv1.0/g/DDATA/n/b");
+        assert_eq!(speech.report(&entry, 6).0, None);
+        assert_eq!(
+            speech.board_gone("b", 6).unwrap().topic,
+            "spBv1.0/g/DDEATH/n/b"
+        );
+        assert_eq!(speech.board_gone("b", 6), None);
+        assert!(speech.report(&entry, 6).0.is_some(), "born again");
+        speech.hello(7);
+        assert!(speech.report(&entry, 7).0.is_some(), "asked for births");
+    }
+}

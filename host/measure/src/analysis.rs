@@ -1,0 +1,260 @@
+//! From samples to reports: the core's analyzer, fed frame by frame.
+//!
+//! A [`Plan`] decides how many rows make a sample and how much memory a window takes; [`Analysis::run`]
+//! then hands every sample and every report to whoever wants them, as they come.
+
+use std::collections::VecDeque;
+
+use rowtone::analyzer::Analyzer;
+use rowtone::camera::Timing;
+use rowtone::report::{Report, Warning};
+use rowtone::spectrum::Config;
+use rowtone::timeline::{Group, Sample, rows_per_sample};
+
+use crate::memory::SpectrumMemory;
+use crate::tracking::{FrameShifts, Shifts, Unmeasured};
+use rowtone_clip::Camera;
+use rowtone_failure::Failure;
+
+/// Highest frequency that is looked for when none is given, Hz: beyond what machines do as a rule, and
+/// few enough samples.
+const USUAL_MAX_HZ: f64 = 2000.0;
+/// Samples are taken this many times as densely as the highest frequency asks for: what the averaging of unlike rows
+/// does to a fast tone is known to the third order of their length, so half of it leaves a sixteenth of the error.
+const DENSER: f64 = 2.0;
+/// A tone this much above the usual highest frequency is still reported.
+const JUST_ABOVE: f64 = 1.05;
+/// Most samples of a window.
+const MOST_SAMPLES: usize = 1 << 20;
+/// Rows flagged in a window, as a share, before it counts as disturbed.
+const DISTURBED_SHARE: f64 = 0.01;
+
+/// What to look for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// Length of a window, s.
+    pub window_s: f64,
+    /// From one window to the next, s.
+    pub hop_s: f64,
+    /// Most peaks reported.
+    pub max_peaks: usize,
+    /// Lowest frequency, Hz.
+    pub min_hz: Option<f64>,
+    /// Highest frequency, Hz.
+    pub max_hz: Option<f64>,
+    /// Scale of the picture, µm a pixel.
+    pub um_per_px: Option<f64>,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            window_s: 1.0,
+            hop_s: 0.5,
+            max_peaks: 8,
+            min_hz: None,
+            max_hz: None,
+            um_per_px: None,
+        }
+    }
+}
+
+/// How a recording will be analysed.
+#[derive(Clone, Copy, Debug)]
+pub struct Plan {
+    config: Config,
+    group: Group,
+    fps: f64,
+    window_s: f64,
+}
+
+impl Plan {
+    /// Chooses how many rows make a sample: as many as the highest frequency allows.
+    ///
+    /// # Errors
+    /// [`Failure::Usage`] for settings that cannot be used.
+    pub fn new(camera: &Camera, settings: &Settings) -> Result<Self, Failure> {
+        let refuse = |error: &dyn std::fmt::Display| Failure::usage(error.to_string());
+        // Rows are counted from the top of the part.
+        let timing = Timing::new(
+            camera.timing.line_time_ps(),
+            camera.timing.exposure_ns(),
+            camera.part_or_rest()?.height as u16,
+        )
+        .map_err(|error| refuse(&error))?;
+        let frames = (settings.window_s * camera.fps).ceil() as u32;
+        let max_hz = settings.max_hz.unwrap_or(USUAL_MAX_HZ);
+        let rows = rows_per_sample(timing, (DENSER * max_hz) as f32, frames, MOST_SAMPLES);
+        let group = Group::new(timing, rows).map_err(|error| refuse(&error))?;
+        let config = Config {
+            window_ns: (settings.window_s * 1e9).round() as i64,
+            hop_ns: (settings.hop_s * 1e9).round() as i64,
+            min_hz: settings.min_hz.map(|hz| hz as f32),
+            max_hz: settings
+                .max_hz
+                .or((!timing.is_global_shutter()).then_some(JUST_ABOVE * USUAL_MAX_HZ))
+                .map(|hz| hz as f32),
+            max_peaks: settings.max_peaks,
+            um_per_px: settings.um_per_px.map(|scale| scale as f32),
+            ..Config::default()
+        };
+        config.check().map_err(|error| refuse(&error))?;
+        Ok(Self {
+            config,
+            group,
+            fps: camera.fps,
+            window_s: settings.window_s,
+        })
+    }
+
+    /// How rows are to be combined.
+    pub fn groups(&self) -> Group {
+        self.group
+    }
+
+    /// The memory that the analysis borrows.
+    pub fn memory(&self) -> SpectrumMemory {
+        SpectrumMemory::new(self.group, self.window_s, self.fps)
+    }
+
+    /// Highest frequency that can be reported, Hz.
+    pub fn max_hz(&self) -> f64 {
+        let spacing_s = match self.group.spacing_ns() {
+            0 => 1.0 / self.fps,
+            ns => ns as f64 * 1e-9,
+        };
+        let known = 0.5 / spacing_s;
+        self.config.max_hz.map_or(known, |hz| known.min(hz.into()))
+    }
+}
+
+/// What an analysis has to say.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Event<'a> {
+    /// A frame has been taken in; it started at this time, ns.
+    Frame(i64),
+    /// Some rows of it, combined.
+    Sample(&'a Sample),
+    /// A window is complete.
+    Report(&'a Report),
+}
+
+/// The analysis of a recording.
+#[derive(Debug)]
+pub struct Analysis<'a> {
+    shifts: Shifts,
+    analyzer: Analyzer<'a>,
+    window_ns: i64,
+    /// When the frames of the window started, ns, and the rows of each that were not measured.
+    unmeasured: VecDeque<(i64, Unmeasured)>,
+}
+
+impl<'a> Analysis<'a> {
+    /// An analysis of what `shifts` delivers, which must combine rows in the plan's groups.
+    ///
+    /// # Errors
+    /// [`Failure::Usage`] for settings that cannot be used.
+    pub fn new(
+        shifts: Shifts,
+        plan: &Plan,
+        memory: &'a mut SpectrumMemory,
+    ) -> Result<Self, Failure> {
+        let analyzer = Analyzer::new(plan.config, plan.group, memory.lend())
+            .map_err(|error| Failure::usage(error.to_string()))?;
+        Ok(Self {
+            shifts,
+            analyzer,
+            window_ns: plan.config.window_ns,
+            unmeasured: VecDeque::new(),
+        })
+    }
+
+    /// Runs to the end of the recording. After an input that becomes unusable the last window still
+    /// comes before the failure.
+    ///
+    /// # Errors
+    /// [`Failure`] of the input, or what `on` returned.
+    pub fn run(
+        &mut self,
+        mut on: impl FnMut(Event<'_>) -> Result<(), Failure>,
+    ) -> Result<(), Failure> {
+        let outcome = loop {
+            match self.shifts.next_frame() {
+                Ok(Some(frame)) => {
+                    self.take(&frame, &mut on)?;
+                    self.shifts.recycle(frame);
+                }
+                Ok(None) => break Ok(()),
+                Err(failure) => break Err(failure),
+            }
+        };
+        if let Some(report) = self.analyzer.finish() {
+            self.hand_on(report, &mut on)?;
+        }
+        outcome
+    }
+
+    /// Something to tell the user after the last frame.
+    pub fn warning(&self) -> Option<&str> {
+        self.shifts.warning()
+    }
+
+    fn take(
+        &mut self,
+        frame: &FrameShifts,
+        on: &mut impl FnMut(Event<'_>) -> Result<(), Failure>,
+    ) -> Result<(), Failure> {
+        on(Event::Frame(frame.start_ns))?;
+        let past = frame.start_ns.saturating_sub(self.window_ns);
+        while self.unmeasured.front().is_some_and(|(t, _)| *t < past) {
+            self.unmeasured.pop_front();
+        }
+        self.unmeasured
+            .push_back((frame.start_ns, frame.unmeasured));
+        frame
+            .samples
+            .iter()
+            .try_for_each(|sample| self.push(sample, on))
+    }
+
+    fn push(
+        &mut self,
+        sample: &Sample,
+        on: &mut impl FnMut(Event<'_>) -> Result<(), Failure>,
+    ) -> Result<(), Failure> {
+        on(Event::Sample(sample))?;
+        if self.analyzer.push(*sample)
+            && let Some(report) = self.analyzer.report()
+        {
+            self.hand_on(report, on)?;
+        }
+        Ok(())
+    }
+
+    fn hand_on(
+        &mut self,
+        mut report: Report,
+        on: &mut impl FnMut(Event<'_>) -> Result<(), Failure>,
+    ) -> Result<(), Failure> {
+        // What only the tracker knows.
+        let mut unmeasured = Unmeasured::default();
+        for (_, of_frame) in &self.unmeasured {
+            unmeasured += *of_frame;
+        }
+        let rows = (self.unmeasured.len() * self.shifts.part.height).max(1);
+        let share = |unmeasured: u32| f64::from(unmeasured) / rows as f64;
+        for (met, warning) in [
+            (
+                share(unmeasured.disturbed) > DISTURBED_SHARE,
+                Warning::Disturbed,
+            ),
+            (unmeasured.learning > 0, Warning::Relearned),
+            (share(unmeasured.no_texture) > 0.5, Warning::LittleTexture),
+        ] {
+            if met {
+                report.warnings.0 |= warning as u16;
+            }
+        }
+        on(Event::Report(&report))
+    }
+}

@@ -1,0 +1,10 @@
+//! The core driven from a recording.
+//!
+//! - [`tracking`]: frames to displacements, on a thread of its own;
+//! - [`analysis`]: displacements to reports, in the memory that [`memory`] lends;
+//! - [`restore`]: gaps filled, for the ear.
+
+pub mod analysis;
+pub mod memory;
+pub mod restore;
+pub mod tracking;

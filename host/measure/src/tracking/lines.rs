@@ -1,0 +1,248 @@
+//! The line thread: learns the reference, then measures every line of every frame.
+
+use std::panic::resume_unwind;
+use std::thread;
+
+use rowtone::timeline::{Binner, Displacement, Group};
+
+use super::region::{self, Region};
+use super::{Ending, Engine, FrameShifts, background};
+use crate::memory::TrackerMemory;
+use rowtone_clip::ring::Outlet;
+use rowtone_clip::{Camera, Feed, Frame, Rect};
+use rowtone_failure::Failure;
+
+/// Frames that the reference is learned from.
+const LEARN_FRAMES: usize = 30;
+/// Frames of the first round.
+const ROUGH_FRAMES: usize = 10;
+/// Fewer where they are so large that keeping them would take more than this, bytes of luma.
+const LEARN_BYTES: usize = 512 << 20;
+
+/// Runs to the end of the recording.
+pub(super) fn run(
+    mut feed: Feed,
+    part: Rect,
+    groups: Option<Group>,
+    mut to: Outlet<FrameShifts, Ending>,
+) {
+    let ending = measure_all(&mut feed, part, groups, &mut to);
+    to.end(ending);
+}
+
+fn measure_all(
+    feed: &mut Feed,
+    part: Rect,
+    groups: Option<Group>,
+    to: &mut Outlet<FrameShifts, Ending>,
+) -> Ending {
+    let memory_for = |part: &Rect| TrackerMemory::new(part.width, part.height);
+    let mut memory = memory_for(&part);
+    let mut still_memory = feed.camera.background.as_ref().map(memory_for);
+    let (kept, more) = keep_first(feed);
+    if kept.len() < 2 {
+        more?;
+        return Err(Failure::input(format!(
+            "{}: only one frame: motion shows only from frame to frame",
+            feed.name
+        )));
+    }
+    let whole = Region::whole(&part);
+    let mut lines = Lines::new(feed, part, &whole, &mut memory, still_memory.as_mut())?;
+    let region = lines.learn_roughly_and_choose(&feed.camera, &kept, &part);
+    let mut note = None;
+    if region != whole {
+        note = Some(told(&region, &feed.camera));
+        lines = Lines::new(feed, part, &region, &mut memory, still_memory.as_mut())?;
+        lines.learn_roughly(&kept);
+    }
+    lines.binner = groups.map(Binner::new);
+    lines.learn(&kept, 1);
+    lines.run(feed, kept, more, note, to)
+}
+
+/// What `--roi auto` chose.
+fn told(region: &Region, camera: &Camera) -> String {
+    let Region { columns, rows } = region;
+    let part = Rect {
+        x: columns.start,
+        y: rows.start,
+        width: columns.len(),
+        height: rows.len(),
+    };
+    // As the user gives it: in the picture as it was.
+    let (width, height) = camera.size;
+    let part = camera.turn.back().part(part, width, height);
+    format!(
+        "--roi auto measures {},{},{},{}: the rest does not move with it (--roi full for all of it)",
+        part.x, part.y, part.width, part.height
+    )
+}
+
+/// The frames to learn from, and whether more follow.
+fn keep_first(feed: &mut Feed) -> (Vec<Frame>, Result<bool, Failure>) {
+    let (width, height) = feed.camera.size;
+    let most = (LEARN_BYTES / (width * height)).clamp(2, LEARN_FRAMES);
+    let mut kept = Vec::new();
+    while kept.len() < most {
+        match feed.next_frame() {
+            Ok(Some(frame)) => kept.push(frame),
+            Ok(None) => return (kept, Ok(false)),
+            Err(failure) => return (kept, Err(failure)),
+        }
+    }
+    (kept, Ok(true))
+}
+
+/// State of the line thread.
+struct Lines<'a> {
+    moving: Engine<'a>,
+    still: Option<Engine<'a>>,
+    /// The background's rows of this frame.
+    still_rows: Vec<Displacement>,
+    /// Where rows are combined.
+    binner: Option<Binner>,
+    /// That stripes were mistaken was told.
+    slips_told: bool,
+}
+
+/// What is told when stripes were mistaken.
+const SLIPPED: &str = "the texture repeats along the rows and was read at another of its stripes: amplitudes and further peaks are not to be trusted; measure a part that does not repeat (--roi)";
+
+impl<'a> Lines<'a> {
+    fn new(
+        feed: &Feed,
+        part: Rect,
+        region: &Region,
+        memory: &'a mut TrackerMemory,
+        still_memory: Option<&'a mut TrackerMemory>,
+    ) -> Result<Self, Failure> {
+        let camera = &feed.camera;
+        let learn = LEARN_FRAMES as u16;
+        let engine =
+            |part, memory| Engine::new(part, camera.timing, camera.bits, learn, memory, &feed.name);
+        let columns = Rect {
+            x: region.columns.start,
+            width: region.columns.len(),
+            ..part
+        };
+        let first = region.rows.start - part.y;
+        let moving = engine(columns, memory)?.only_rows(first..first + region.rows.len());
+        let still = match (camera.background, still_memory) {
+            (Some(part), Some(memory)) => Some(engine(part, memory)?),
+            _ => None,
+        };
+        Ok(Self {
+            moving,
+            still,
+            still_rows: Vec::new(),
+            binner: None,
+            slips_told: false,
+        })
+    }
+
+    /// The first round of learning, and which part of `part` vibrates, where that is asked for: chosen on another thread
+    /// while this one learns all of it, for mostly that is what is chosen.
+    fn learn_roughly_and_choose(&mut self, camera: &Camera, kept: &[Frame], part: &Rect) -> Region {
+        if camera.part.is_some() {
+            self.learn_roughly(kept);
+            return Region::whole(part);
+        }
+        thread::scope(|scope| {
+            let choice = scope.spawn(|| region::choose(kept, part, &camera.timing));
+            self.learn_roughly(kept);
+            choice.join().unwrap_or_else(|panic| resume_unwind(panic))
+        })
+    }
+
+    /// The first round only has to find the motion: some frames, spread over all of them, will do.
+    fn learn_roughly(&mut self, kept: &[Frame]) {
+        self.learn(kept, kept.len().div_ceil(ROUGH_FRAMES));
+    }
+
+    /// A round of learning, of one in `step` frames.
+    fn learn(&mut self, kept: &[Frame], step: usize) {
+        let engines = [Some(&mut self.moving), self.still.as_mut()];
+        for engine in engines.into_iter().flatten() {
+            kept.iter()
+                .step_by(step)
+                .for_each(|frame| engine.learn(frame));
+            engine.end_round();
+        }
+    }
+
+    /// Measures every frame. The warning at the end is the feed's.
+    fn run(
+        &mut self,
+        feed: &mut Feed,
+        kept: Vec<Frame>,
+        mut more: Result<bool, Failure>,
+        mut note: Option<String>,
+        to: &mut Outlet<FrameShifts, Ending>,
+    ) -> Ending {
+        for frame in kept {
+            if !self.measure(feed, frame, note.take(), to) {
+                return Ok(None);
+            }
+        }
+        while let Ok(true) = more {
+            match feed.next_frame() {
+                Ok(Some(frame)) => {
+                    if !self.measure(feed, frame, None, to) {
+                        return Ok(None);
+                    }
+                }
+                Ok(None) => more = Ok(false),
+                Err(failure) => more = Err(failure),
+            }
+        }
+        more.map(|_| feed.warning().map(str::to_owned))
+    }
+
+    /// Measures a frame and sends what came of it. `false` when nobody listens any more.
+    fn measure(
+        &mut self,
+        feed: &mut Feed,
+        frame: Frame,
+        note: Option<String>,
+        to: &mut Outlet<FrameShifts, Ending>,
+    ) -> bool {
+        let Some(mut shifts) = to.spare() else {
+            return false;
+        };
+        shifts.number = frame.number;
+        shifts.start_ns = frame.start_ns;
+        shifts.note = note;
+        shifts.rows.clear();
+        shifts.samples.clear();
+        if let Some(binner) = &mut self.binner {
+            binner.set_curvature(self.moving.curvature());
+        }
+        let (rows, samples) = (&mut shifts.rows, &mut shifts.samples);
+        match (&mut self.still, &mut self.binner) {
+            (None, Some(binner)) => {
+                let take = |sample| samples.push(sample);
+                shifts.unmeasured = self.moving.measure_into(&frame, binner, take);
+            }
+            (still, binner) => {
+                shifts.unmeasured = self.moving.measure(&frame, |row| rows.push(row));
+                if let Some(still) = still {
+                    self.still_rows.clear();
+                    still.measure(&frame, |row| self.still_rows.push(row));
+                    background::subtract(rows, &self.still_rows);
+                }
+                if let Some(binner) = binner {
+                    samples.extend(rows.drain(..).filter_map(|row| binner.push(row)));
+                }
+            }
+        }
+        if self.moving.slipped() && !self.slips_told && shifts.note.is_none() {
+            self.slips_told = true;
+            shifts.note = Some(SLIPPED.to_owned());
+        }
+        // No group reaches over the end of a frame.
+        samples.extend(self.binner.as_mut().and_then(Binner::finish));
+        feed.recycle(frame);
+        to.put(shifts)
+    }
+}

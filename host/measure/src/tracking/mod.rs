@@ -1,0 +1,134 @@
+//! From frames to displacements, on a thread of its own.
+//!
+//! [`Shifts::start`] takes a [`Feed`] and tracks its lines; [`Shifts::next_frame`] delivers what the
+//! lines of each frame came to, in order: row by row, or combined as they are measured, so that some
+//! samples leave the thread and not every row. A tracker first learns its reference; so that nothing is
+//! lost, the first frames are kept until it has, and then measured like all others: a clip of six frames
+//! gets the displacements of six frames. Queues are short and their buffers are used again, so memory
+//! does not grow with the length of the recording, and nothing is sent line by line.
+
+mod background;
+mod engine;
+mod lines;
+pub mod region;
+
+use rowtone::timeline::{Displacement, Group, Sample};
+
+pub use background::subtract;
+pub use engine::{Engine, Unmeasured};
+
+use crate::memory::TrackerMemory;
+use rowtone_clip::ring::{Inlet, Next, ring};
+use rowtone_clip::{Camera, Feed, Rect};
+use rowtone_failure::Failure;
+
+/// Blocks of displacements on their way: the lines go on while a report is computed, which takes a millisecond or two,
+/// of as much as a hundred frames.
+const BLOCKS: usize = 4;
+/// Frames of a block, where nobody waits for each.
+const BLOCK_FRAMES: usize = 32;
+
+/// What the lines of one frame came to.
+#[derive(Debug, Default)]
+pub struct FrameShifts {
+    /// Number of the frame; a lost one leaves a gap.
+    pub number: u32,
+    /// Start of exposure of its first row, ns.
+    pub start_ns: i64,
+    /// Rows that were measured, from the top of the part, the background's motion subtracted; none where
+    /// they are combined.
+    pub rows: Vec<Displacement>,
+    /// The rows combined, where that was asked for.
+    pub samples: Vec<Sample>,
+    /// Rows that were not measured.
+    pub unmeasured: Unmeasured,
+    /// Something to tell the user at once.
+    note: Option<String>,
+}
+
+/// How the lines ended, with the warning that the user is told in the end.
+type Ending = Result<Option<String>, Failure>;
+
+/// The displacements of a recording, frame by frame.
+#[derive(Debug)]
+pub struct Shifts {
+    inlet: Inlet<FrameShifts, Ending>,
+    warning: Option<String>,
+    /// The camera that recorded them.
+    pub camera: Camera,
+    /// The part of the turned picture that is measured.
+    pub part: Rect,
+    /// How many frames there are, where the file's length tells.
+    pub frames: Option<u64>,
+    /// What to call the recording in messages.
+    pub name: String,
+    /// What was chosen for the user is not told on standard error.
+    pub quiet: bool,
+}
+
+impl Shifts {
+    /// Starts tracking. Rows are delivered one by one, or combined to samples in these groups.
+    ///
+    /// # Errors
+    /// [`Failure`] when the part to measure cannot be measured.
+    pub fn start(feed: Feed, groups: Option<Group>) -> Result<Self, Failure> {
+        let camera = feed.camera.clone();
+        let part = camera.part_or_rest()?;
+        let block = if feed.frames.is_some() {
+            BLOCK_FRAMES
+        } else {
+            1
+        };
+        let (outlet, inlet) = ring(BLOCKS * BLOCK_FRAMES / block, block);
+        let (frames, name) = (feed.frames, feed.name.clone());
+        // Made here and dropped at once: a part that cannot be measured is refused before anything
+        // is read.
+        for part in [Some(part), camera.background].into_iter().flatten() {
+            let mut memory = TrackerMemory::new(part.width, part.height);
+            Engine::new(part, camera.timing, camera.bits, 1, &mut memory, &name)?;
+        }
+        std::thread::spawn(move || lines::run(feed, part, groups, outlet));
+        Ok(Self {
+            inlet,
+            warning: None,
+            camera,
+            part,
+            frames,
+            name,
+            quiet: false,
+        })
+    }
+
+    /// The next frame's displacements; `None` after the last.
+    ///
+    /// # Errors
+    /// [`Failure::Input`] when the input turns out to be unusable at this point; what came before was
+    /// good.
+    pub fn next_frame(&mut self) -> Result<Option<FrameShifts>, Failure> {
+        match self.inlet.receive() {
+            Next::Item(mut frame) => {
+                if let Some(note) = frame.note.take()
+                    && !self.quiet
+                {
+                    eprintln!("rowtone: {}: {note}", self.name);
+                }
+                Ok(Some(frame))
+            }
+            Next::End(ending) => {
+                self.warning = ending?;
+                Ok(None)
+            }
+            Next::Gone => Ok(None),
+        }
+    }
+
+    /// Gives a frame's buffers back.
+    pub fn recycle(&mut self, frame: FrameShifts) {
+        self.inlet.recycle(frame);
+    }
+
+    /// Something to tell the user after the last frame.
+    pub fn warning(&self) -> Option<&str> {
+        self.warning.as_deref()
+    }
+}

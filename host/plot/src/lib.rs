@@ -1,0 +1,195 @@
+//! A recording as a picture: spectrum, displacement over a few frames, spectrogram.
+//!
+//! A [`Picture`] is shown every sample and every report and drawn at the end. It keeps the samples of
+//! one window and a bounded number of spectra, so it does not grow with the recording.
+
+mod draw;
+mod render;
+mod residual;
+mod spectrogram;
+
+use std::collections::VecDeque;
+use std::path::{Path, PathBuf};
+
+use rowtone::report::Report;
+use rowtone::timeline::Sample;
+
+pub use render::png;
+
+use self::residual::Fit;
+use self::spectrogram::Spectrogram;
+use rowtone_failure::Failure;
+
+/// Points of the noise floor.
+const FLOOR_POINTS: usize = 600;
+/// Rows of the spectrogram.
+const SPECTROGRAM_ROWS: usize = 200;
+/// A sinc below this is not divided by: near its zeros the exposure leaves nothing to see.
+const LEAST_SINC: f64 = 0.2;
+
+/// What a picture is to show.
+#[derive(Clone, Debug)]
+pub struct Settings {
+    /// File to write, `.svg` or `.png`.
+    pub path: PathBuf,
+    /// What to write above.
+    pub title: String,
+    /// Frequencies to show, Hz.
+    pub band_hz: (f64, f64),
+    /// Exposure of a row, s.
+    pub exposure_s: f64,
+    /// All rows of a frame are one sample.
+    pub one_a_frame: bool,
+}
+
+/// A picture in the making.
+#[derive(Debug)]
+pub struct Picture {
+    settings: Settings,
+    /// Start of the recording, ns.
+    start_ns: Option<i64>,
+    samples: VecDeque<Sample>,
+    spectrogram: Spectrogram,
+    last: Option<(Report, Fit)>,
+}
+
+impl Picture {
+    /// Starts a picture.
+    pub fn new(settings: Settings) -> Self {
+        Self {
+            settings,
+            start_ns: None,
+            samples: VecDeque::new(),
+            spectrogram: Spectrogram::default(),
+            last: None,
+        }
+    }
+
+    /// Says when the recording started, ns: reports count from there.
+    pub fn start(&mut self, start_ns: i64) {
+        self.start_ns.get_or_insert(start_ns);
+    }
+
+    /// Shows it a sample.
+    pub fn sample(&mut self, sample: &Sample) {
+        self.samples.push_back(*sample);
+    }
+
+    /// Shows it the report of a window; the samples of that window must have been shown.
+    pub fn report(&mut self, report: &Report) {
+        let end_s = report.time_ms as f64 * 1e-3;
+        let start_s = end_s - f64::from(report.window_s);
+        let origin = self.start_ns.unwrap_or(0);
+        let at = |s: f64| origin + (s * 1e9) as i64;
+        while self
+            .samples
+            .front()
+            .is_some_and(|s| s.time_ns < at(start_s))
+        {
+            self.samples.pop_front();
+        }
+        let window: Vec<Sample> = self
+            .samples
+            .iter()
+            .take_while(|s| s.time_ns <= at(end_s + 1e-3))
+            .copied()
+            .collect();
+        let hz: Vec<f64> = report.peaks.iter().map(|p| p.hz.into()).collect();
+        let fit = Fit::new(&window, &hz);
+        let mut column: Vec<f32> = self
+            .floor(&fit, SPECTROGRAM_ROWS)
+            .iter()
+            .map(|point| point.1 as f32)
+            .collect();
+        let (low, high) = self.settings.band_hz;
+        for peak in &report.peaks {
+            let place = (f64::from(peak.hz) - low) / (high - low) * SPECTROGRAM_ROWS as f64;
+            if let Some(row) = column.get_mut(place as usize) {
+                *row = row.max(peak.amplitude_px);
+            }
+        }
+        self.spectrogram.push(column);
+        self.spectrogram.start_s.get_or_insert(start_s.max(0.0));
+        self.spectrogram.end_s = end_s;
+        self.last = Some((report.clone(), fit));
+    }
+
+    /// The noise floor at the middles of `count` parts of the band.
+    fn floor(&self, fit: &Fit, count: usize) -> Vec<(f64, f64)> {
+        let (low, high) = self.settings.band_hz;
+        (0..count)
+            .map(|i| {
+                let hz = low + (high - low) * (i as f64 + 0.5) / count as f64;
+                let x = std::f64::consts::PI * hz * self.settings.exposure_s;
+                let sinc = if x > 0.0 { (x.sin() / x).abs() } else { 1.0 };
+                (hz, fit.rest_amplitude_px(hz) / sinc.max(LEAST_SINC))
+            })
+            .collect()
+    }
+
+    /// Draws the picture and writes it. Nothing is written when there was no report.
+    ///
+    /// # Errors
+    /// [`Failure::Input`] when the file cannot be written.
+    pub fn save(&self) -> Result<(), Failure> {
+        let Some((report, fit)) = &self.last else {
+            return Ok(());
+        };
+        let path = &self.settings.path;
+        let failed = |error: &dyn std::fmt::Display| {
+            Failure::input(format!("{}: cannot be drawn: {error}", path.display()))
+        };
+        let svg = draw::svg(&draw::Scene {
+            title: &self.settings.title,
+            report,
+            fit,
+            floor: &self.floor(fit, FLOOR_POINTS),
+            spectrogram: &self.spectrogram,
+            band_hz: self.settings.band_hz,
+            one_a_frame: self.settings.one_a_frame,
+        })
+        .map_err(|error| failed(&error))?;
+        write(path, svg)
+    }
+}
+
+/// Writes a drawing, as what the file's ending says.
+///
+/// # Errors
+/// [`Failure::Input`] when it cannot be drawn or written.
+pub fn write(path: &Path, svg: String) -> Result<(), Failure> {
+    let name = path.display();
+    let bytes = match ending(path) {
+        Some(Ending::Png) => png(&svg)
+            .map_err(|error| Failure::input(format!("{name}: cannot be drawn: {error}")))?,
+        _ => svg.into_bytes(),
+    };
+    std::fs::write(path, bytes).map_err(|error| Failure::writing(&name.to_string(), &error))
+}
+
+/// Whether a picture of this name can be drawn.
+///
+/// # Errors
+/// [`Failure::Usage`] when its ending is neither `.svg` nor `.png`.
+pub fn check_ending(path: &Path) -> Result<(), Failure> {
+    match ending(path) {
+        Some(_) => Ok(()),
+        None => Err(Failure::usage(format!(
+            "--plot {}: want a file that ends in .svg or .png",
+            path.display()
+        ))),
+    }
+}
+
+enum Ending {
+    Svg,
+    Png,
+}
+
+fn ending(path: &Path) -> Option<Ending> {
+    match path.extension()?.to_str()?.to_ascii_lowercase().as_str() {
+        "svg" => Some(Ending::Svg),
+        "png" => Some(Ending::Png),
+        _ => None,
+    }
+}

@@ -1,0 +1,126 @@
+//! Reports as JSON Lines: one object a line, keys and units as `docs/` and `rowtone analyze --help` say.
+
+use rowtone::report::{Peak, Report};
+use serde::Serialize;
+
+use super::zone::ZoneLimits;
+use super::{band_velocity, velocity_mm_s_rms, warnings};
+
+#[derive(Serialize)]
+struct ReportObject {
+    seq: u32,
+    t_s: f64,
+    window_s: f32,
+    fps: f32,
+    lines: u32,
+    lost_frames: u16,
+    noise_px: f32,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    velocity_mm_s_rms: Option<f32>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    zone: Option<char>,
+    peaks: Vec<PeakObject>,
+    warnings: Vec<&'static str>,
+}
+
+#[derive(Serialize)]
+struct PeakObject {
+    hz: f32,
+    hz_sd: f32,
+    amplitude_px: f32,
+    amplitude_px_sd: f32,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    amplitude_um: Option<f32>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    velocity_mm_s_rms: Option<f32>,
+    snr_db: f32,
+    ambiguous: bool,
+    track: u16,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    harmonic: Option<u8>,
+}
+
+impl PeakObject {
+    fn new(peak: &Peak, um_per_px: Option<f32>) -> Self {
+        let amplitude_um = um_per_px.map(|scale| peak.amplitude_px * scale);
+        Self {
+            hz: peak.hz,
+            hz_sd: peak.hz_sd,
+            amplitude_px: peak.amplitude_px,
+            amplitude_px_sd: peak.amplitude_px_sd,
+            amplitude_um,
+            velocity_mm_s_rms: amplitude_um
+                .map(|um| velocity_mm_s_rms(peak.hz.into(), um.into()) as f32),
+            snr_db: peak.snr_db,
+            ambiguous: peak.ambiguous,
+            track: peak.track,
+            harmonic: peak.harmonic,
+        }
+    }
+}
+
+/// One report as a JSON object, without a line feed.
+pub fn report(report: &Report) -> String {
+    zoned(report, None)
+}
+
+/// The same, with the machine's zone where the limits are given and there is a scale.
+pub fn zoned(report: &Report, limits: Option<&ZoneLimits>) -> String {
+    let velocity = band_velocity(report);
+    let object = ReportObject {
+        seq: report.seq,
+        t_s: report.time_ms as f64 / 1000.0,
+        window_s: report.window_s,
+        fps: report.fps,
+        lines: report.lines,
+        lost_frames: report.lost_frames,
+        noise_px: report.noise_px,
+        velocity_mm_s_rms: velocity.map(|v| v as f32),
+        zone: limits.zip(velocity).map(|(limits, v)| limits.zone(v)),
+        peaks: report
+            .peaks
+            .iter()
+            .map(|peak| PeakObject::new(peak, report.um_per_px))
+            .collect(),
+        warnings: warnings(report.warnings).map(|(name, _)| name).collect(),
+    };
+    // Numbers, strings and lists of them always serialise; a number that is not finite becomes null.
+    serde_json::to_string(&object).unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::example;
+
+    #[test]
+    fn the_keys_are_the_contract() {
+        assert_eq!(
+            super::report(&example(None)),
+            concat!(
+                r#"{"seq":3,"t_s":2.5,"window_s":1.0,"fps":60.0,"lines":18000,"lost_frames":2,"#,
+                r#""noise_px":0.0131,"peaks":[{"hz":49.2003,"hz_sd":0.0004,"amplitude_px":0.3998,"#,
+                r#""amplitude_px_sd":0.0002,"snr_db":61.2,"ambiguous":false,"track":1},{"hz":1500.0,"#,
+                r#""hz_sd":0.0004,"amplitude_px":0.02,"amplitude_px_sd":0.0002,"snr_db":61.2,"#,
+                r#""ambiguous":false,"track":1}],"warnings":["lost_frames","disturbed"]}"#
+            )
+        );
+    }
+
+    #[test]
+    fn a_scale_adds_micrometres_and_velocities() {
+        let text = super::report(&example(Some(100.0)));
+        let object: serde_json::Value = serde_json::from_str(&text).unwrap();
+        let close = |value: &serde_json::Value, want: f64| {
+            let value = value.as_f64().unwrap();
+            assert!((value / want - 1.0).abs() < 1e-3, "{value} for {want}");
+        };
+        close(&object["peaks"][0]["amplitude_um"], 39.98);
+        close(&object["peaks"][0]["velocity_mm_s_rms"], 8.7395);
+        close(&object["velocity_mm_s_rms"], 8.7395);
+        assert!(object.get("zone").is_none());
+        let limits = "2.3,4.5,7.1".parse().unwrap();
+        let text = super::zoned(&example(Some(100.0)), Some(&limits));
+        assert!(text.contains(r#""zone":"D""#), "{text}");
+        assert!(!super::zoned(&example(None), Some(&limits)).contains("zone"));
+    }
+}

@@ -1,0 +1,115 @@
+//! Reports for a person's eyes.
+
+use std::fmt::Write;
+
+use rowtone::report::{Peak, Report};
+
+use super::zone::ZoneLimits;
+use super::{band_velocity, velocity_mm_s_rms, warnings};
+
+/// A report as a heading and one line a peak, without the last line feed.
+pub fn report(report: &Report) -> String {
+    zoned(report, None)
+}
+
+/// The same, with the machine's zone where the limits are given and there is a scale.
+pub fn zoned(report: &Report, limits: Option<&ZoneLimits>) -> String {
+    let mut text = format!(
+        "{:8.2} s  #{}: {:.2} s at {:.3} fps, {} rows, noise {} px a row",
+        report.time_ms as f64 / 1000.0,
+        report.seq,
+        report.window_s,
+        report.fps,
+        report.lines,
+        digits(report.noise_px.into(), 2),
+    );
+    // Writing to a string cannot fail.
+    if let Some(velocity) = band_velocity(report) {
+        let _ = write!(text, ", {velocity:.3} mm/s RMS (10-1000 Hz)");
+        if let Some(limits) = limits {
+            let _ = write!(text, ", zone {}", limits.zone(velocity));
+        }
+    }
+    if report.peaks.is_empty() {
+        text.push_str("\n            no vibration above the noise");
+    }
+    for peak in &report.peaks {
+        let _ = write!(text, "\n{}", peak_line(peak, report.um_per_px));
+    }
+    for (_, sentence) in warnings(report.warnings) {
+        let _ = write!(text, "\n            note: {sentence}");
+    }
+    text
+}
+
+fn peak_line(peak: &Peak, um_per_px: Option<f32>) -> String {
+    let mut line = format!(
+        "{:>14.4} Hz ± {:<8} {:>9.5} px ± {:<8}",
+        peak.hz,
+        digits(peak.hz_sd.into(), 2),
+        peak.amplitude_px,
+        digits(peak.amplitude_px_sd.into(), 2),
+    );
+    if let Some(scale) = um_per_px {
+        let um = f64::from(peak.amplitude_px * scale);
+        let _ = write!(
+            line,
+            " {um:>9.3} µm {:>9.4} mm/s",
+            velocity_mm_s_rms(peak.hz.into(), um)
+        );
+    }
+    let _ = write!(line, " {:>6.1} dB", peak.snr_db);
+    if let Some(harmonic) = peak.harmonic {
+        let _ = write!(line, "  {harmonic}x");
+    }
+    if peak.ambiguous {
+        line.push_str("  ambiguous: near a multiple of the frame rate");
+    }
+    line
+}
+
+/// A number with `count` significant digits, without an exponent where it has a sensible size.
+///
+/// ```
+/// use rowtone_report::text::digits;
+/// assert_eq!(digits(0.0131, 2), "0.013");
+/// assert_eq!(digits(1234.6, 2), "1235");
+/// assert_eq!(digits(0.0, 2), "0");
+/// assert_eq!(digits(1.2e-9, 2), "1.2e-9");
+/// ```
+pub fn digits(value: f64, count: usize) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return value.to_string();
+    }
+    let magnitude = value.abs().log10().floor() as i32;
+    if magnitude < -6 {
+        return format!("{value:.*e}", count.saturating_sub(1));
+    }
+    let decimals = (count as i32 - 1 - magnitude).max(0);
+    format!("{value:.*}", decimals as usize)
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::example;
+
+    #[test]
+    fn a_report_reads_well() {
+        let text = super::report(&example(None));
+        assert_eq!(
+            text,
+            "    2.50 s  #3: 1.00 s at 60.000 fps, 18000 rows, noise 0.013 px a row\n\
+             \x20      49.2003 Hz ± 0.00040    0.39980 px ± 0.00020    61.2 dB\n\
+             \x20    1500.0000 Hz ± 0.00040    0.02000 px ± 0.00020    61.2 dB\n\
+             \x20           note: frames were lost\n\
+             \x20           note: something passed through the picture: its rows were left out"
+        );
+        assert!(super::report(&example(Some(10.0))).contains("µm"));
+        let limits = "0.5,2.8,7.1".parse().unwrap();
+        let text = super::zoned(&example(Some(10.0)), Some(&limits));
+        assert!(
+            text.contains("0.874 mm/s RMS (10-1000 Hz), zone B"),
+            "{text}"
+        );
+    }
+}
