@@ -49,6 +49,7 @@ impl Window {
                     shift_px: (moved + 0.014 * (unit() + unit() + unit())) as f32,
                     information_per_px2: 2e4,
                     spread: Spread::default(),
+                    vertical: None,
                 });
             }
         }

@@ -38,6 +38,7 @@ use crate::timeline::{Group, Sample};
 ///             + 0.01 * (f64::from(noise) / 4.3e9 - 0.5);
 ///         let sample = Sample {
 ///             frame, slot, curvature: Default::default(), time_ns, shift_px: shift_px as f32, information_per_px2: 1e5, spread: group.even_spread(),
+///             vertical: None,
 ///         };
 ///         assert!(!analyzer.push(sample));
 ///     }

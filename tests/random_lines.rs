@@ -204,6 +204,7 @@ proptest! {
                 time_ns: if tame { n * 5_000_000 } else { time_ns },
                 shift_px,
                 information_per_px2: information_per_px2.abs(),
+                vertical: None,
             };
             let Some(sample) = binner.push(d) else { continue };
             if analyzer.push(sample) && let Some(report) = analyzer.report() {

@@ -113,6 +113,7 @@ fn nothing_panics_and_all_is_finite() {
                         variance_ns2: if strange { draw.of(&odd) } else { 1e9 },
                         third_ns3: if strange { draw.of(&odd) } else { 1e13 },
                     },
+                    vertical: None,
                 };
                 if analyzer.push(sample) && !draw.once_in(4) {
                     let report = analyzer.report().expect("a window was ready");

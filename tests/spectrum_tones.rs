@@ -56,6 +56,7 @@ impl Camera {
                     time_ns,
                     shift_px: (moved + self.noise_px * noise.draw()) as f32,
                     information_per_px2: (1.0 / (self.noise_px * self.noise_px)) as f32,
+                    vertical: None,
                 });
                 if sample.is_some_and(|s| analyzer.push(s)) {
                     reports.extend(analyzer.report());
@@ -197,6 +198,7 @@ fn uneven_rows_make_no_ghosts() {
                 time_ns,
                 shift_px: (moved + noise.draw() / known.sqrt()) as f32,
                 information_per_px2: known as f32,
+                vertical: None,
             });
             assert!(!sample.is_some_and(|s| analyzer.push(s)));
         }
@@ -309,6 +311,7 @@ fn ten_days_are_like_the_first_second() {
                     shift_px: shift as f32,
                     information_per_px2: 62_500.0,
                     spread: Default::default(),
+                    vertical: None,
                 });
                 if ready {
                     reports.extend(analyzer.report());

@@ -336,6 +336,7 @@ mod tests {
                     shift_px: 0.01 * ((frame * 7 + u32::from(slot) * 3) % 11) as f32,
                     information_per_px2: 1e4,
                     spread: Spread::default(),
+                    vertical: None,
                 });
                 if complete {
                     reports.extend(analyzer.report());

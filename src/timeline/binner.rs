@@ -6,18 +6,22 @@
 //! rows' own offsets would no longer be those of the other frames.
 
 use super::{
-    Curvature, Displacement, Group, Sample, Spread,
+    Curvature, Displacement, Group, Sample, Spread, Vertical,
     ladder::{Ladder, Moments},
     lateness::Lateness,
+    vertical::VerticalSums,
 };
 
 /// Rows of a sample are combined by their information, so none may be worth more than this, 1/px².
 const MOST_INFORMATION: f32 = 1e18;
 
+/// Nor may a row take more of a shift downwards for one to the right.
+const MOST_COUPLING: f32 = 1e6;
+
 /// Longest frame gap that is still counted as lost frames: beyond it the camera was restarted.
 const LONGEST_LOSS: u32 = 100_000;
 
-/// A row and what is known of it: information greater than 0, both finite.
+/// A row and what is known of it: information greater than 0, or 0 where its [`Vertical`] knows something; both finite.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RowShift {
     pub(crate) frame: u32,
@@ -61,6 +65,7 @@ struct Open {
     bright_row: u16,
     to_reference: f32,
     anchor_px: f32,
+    vertical: VerticalSums,
 }
 
 impl Open {
@@ -98,6 +103,7 @@ impl Open {
 /// let mut binner = Binner::new(group);
 /// let row = |row, shift_px| Displacement {
 ///     frame: 0, row, time_ns: row as i64 * 20_000, shift_px, information_per_px2: 100.0,
+///     vertical: None,
 /// };
 /// assert_eq!(binner.push(row(0, 0.1)), None);
 /// assert_eq!(binner.push(row(1, 0.3)), None);
@@ -150,7 +156,14 @@ impl Binner {
     /// one that comes after a later one of its group.
     pub fn push(&mut self, d: Displacement) -> Option<Sample> {
         let (shift_px, information) = (d.shift_px, d.information_per_px2);
-        let known = information > 0.0 && information.is_finite() && shift_px.is_finite();
+        let own = d.vertical.map_or(0.0, |v| v.information_per_px2);
+        let more = d.vertical.unwrap_or_default();
+        let known = (information > 0.0 || information == 0.0 && own > 0.0)
+            && information.is_finite()
+            && shift_px.is_finite()
+            && (0.0..=MOST_INFORMATION).contains(&own)
+            && more.shift_px.is_finite()
+            && more.coupling.abs() < MOST_COUPLING;
         if !known || d.row >= self.group.timing().rows() {
             self.count_lost(d.frame);
             return if self.is_open_for(d.frame, d.row) {
@@ -181,6 +194,9 @@ impl Binner {
             .time_ns
             .saturating_sub(self.open.first_ns.saturating_add(place));
         self.note_later(row.information_per_px2, later_ns as f32);
+        if let Some(vertical) = &d.vertical {
+            self.note_vertical(row, vertical);
+        }
         done
     }
 
@@ -205,6 +221,23 @@ impl Binner {
     /// The row pushed last was exposed so much later than its place says, ns.
     fn note_later(&mut self, information_per_px2: f32, later_ns: f32) {
         self.open.weighted_later += information_per_px2 * later_ns;
+    }
+
+    /// The row pushed last knows so much of the motion along the columns.
+    #[inline(always)]
+    pub(crate) fn note_vertical(&mut self, row: RowShift, vertical: &Vertical) {
+        let open = &mut self.open;
+        // Not where it came too late for its group.
+        if open.next_row == row.row.wrapping_add(1) && open.frame == row.frame {
+            let after = row.row.wrapping_sub(open.first_row);
+            let RowShift {
+                shift_px,
+                information_per_px2,
+                ..
+            } = row;
+            open.vertical
+                .add(after, shift_px, information_per_px2, vertical);
+        }
     }
 
     fn is_open_for(&self, frame: u32, row: u16) -> bool {
@@ -284,6 +317,9 @@ impl Binner {
         open.information = Ladder::default();
         open.weighted_shift = 0.0;
         open.weighted_later = 0.0;
+        if !open.vertical.is_empty() {
+            open.vertical = VerticalSums::default();
+        }
         (open.bright_row, open.to_reference) = (row.row, begin.to_reference);
         open.anchor_px = begin.anchor_px;
         open.add(row);
@@ -319,6 +355,9 @@ impl Binner {
             return None;
         }
         let information_per_px2 = open.information.weight();
+        if information_per_px2 == 0.0 {
+            return self.close_along_columns();
+        }
         let per_information = 1.0 / information_per_px2;
         let shift_px = open.weighted_shift * per_information + open.anchor_px;
         if !shift_px.is_finite() {
@@ -330,6 +369,11 @@ impl Binner {
             third,
         } = open.information.moments(per_information);
         let rows = f32::from(open.next_row.wrapping_sub(open.first_row)) - to_next;
+        let vertical = (!open.vertical.is_empty()).then(|| {
+            let weighted = open.weighted_shift;
+            let sums = &open.vertical;
+            sums.settle(weighted, information_per_px2, rows, self.line_ns)
+        });
         let own_ns = self.late_ns + open.weighted_later * per_information;
         let later_ns = rows * self.line_ns + own_ns;
         let later_ns = if later_ns.abs() < 1e9 {
@@ -350,6 +394,27 @@ impl Binner {
                 variance_ns2: variance * line_ns2,
                 third_ns3: third * line_ns2 * self.line_ns,
             },
+            vertical,
+        })
+    }
+
+    /// [`Binner::close`] of a group whose rows know nothing of x: all their edges lie along them.
+    #[cold]
+    fn close_along_columns(&mut self) -> Option<Sample> {
+        let open = &self.open;
+        let mean_row = open.vertical.mean_row()?;
+        let later_ns = mean_row * self.line_ns + self.late_ns;
+        let vertical = open.vertical.settle(0.0, 0.0, mean_row, self.line_ns);
+        let known = vertical.information_per_px2 > 0.0 && vertical.shift_px.is_finite();
+        known.then_some(Sample {
+            frame: open.frame,
+            slot: open.slot,
+            curvature: self.curvature,
+            time_ns: open.first_ns.saturating_add(rounded_ns(later_ns)),
+            shift_px: 0.0,
+            information_per_px2: 0.0,
+            spread: self.group.even_spread(),
+            vertical: Some(vertical),
         })
     }
 
@@ -399,6 +464,7 @@ mod tests {
             time_ns: i64::from(frame) * 1_000_000 + i64::from(row) * 10_000,
             shift_px,
             information_per_px2,
+            vertical: None,
         }
     }
 

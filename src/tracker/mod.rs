@@ -315,6 +315,7 @@ impl<'a> Tracker<'a> {
                 )),
                 shift_px: place.shift_px + self.follow.anchor_px(),
                 information_per_px2: place.information_per_px2,
+                vertical: None,
             }),
             Err(Left::Learning) => Outcome::Learning,
             Err(Left::NoTexture) => Outcome::NoTexture,

@@ -192,6 +192,7 @@ mod tests {
                     shift_px: (tone + f64::from(slot) * 0.01) as f32,
                     information_per_px2: 1e4,
                     spread: Default::default(),
+                    vertical: None,
                 }
             })
             .collect();

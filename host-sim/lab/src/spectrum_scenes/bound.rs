@@ -117,6 +117,7 @@ mod tests {
                 shift_px: 0.0,
                 information_per_px2: 100.0,
                 spread: Default::default(),
+                vertical: None,
             })
             .collect();
         let bound = Bound::of(&samples, 1.0, &[(123.4, 0.3)])[0];

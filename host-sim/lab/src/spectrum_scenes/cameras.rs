@@ -215,6 +215,7 @@ pub(super) fn rows(camera: &Camera) -> Vec<Sample> {
                 shift_px: 0.0,
                 information_per_px2: (1.0 / (bound * bound)) as f32,
                 spread: Spread::default(),
+                vertical: None,
             });
         }
     }

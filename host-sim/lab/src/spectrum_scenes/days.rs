@@ -93,6 +93,7 @@ pub fn run(days: u32, seed: u64, mut on: impl FnMut(&Day)) {
                 shift_px: moved as f32 + noise,
                 information_per_px2: (1.0 / (NOISE_PX * NOISE_PX)) as f32,
                 spread: Default::default(),
+                vertical: None,
             });
             if ready && let Some(report) = analyzer.report() {
                 tally.add(&report, late_ns / 1_000_000);

@@ -171,6 +171,7 @@ impl Scene {
                     shift_px: shift as f32,
                     information_per_px2: (information * claim) as f32,
                     spread: Default::default(),
+                    vertical: None,
                 });
             }
         }

@@ -53,6 +53,7 @@ mod tests {
             time_ns,
             shift_px,
             information_per_px2,
+            vertical: None,
         }
     }
 
