@@ -5,8 +5,8 @@ use core::f64::consts::TAU;
 use std::time::{Duration, Instant};
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
-use rowtone::analyzer::Analyzer;
 use rowtone::camera::Timing;
+use rowtone::pipeline::Analyzer;
 use rowtone::spectrum::{Config, StaticStorage};
 use rowtone::timeline::{Group, Sample, Spread};
 

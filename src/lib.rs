@@ -70,21 +70,14 @@
 #![no_std]
 #![deny(unsafe_code)]
 
-mod align;
-pub mod analyzer;
-pub mod band;
 pub mod camera;
 pub mod kernel;
 pub mod link;
-pub mod noise;
-pub mod outbox;
-mod pixel;
-pub mod raw;
+mod math;
+pub mod pipeline;
 pub mod reference;
 pub mod report;
-pub mod settings;
 pub mod spectrum;
-mod time;
 pub mod timeline;
 pub mod tracker;
 pub mod wire;

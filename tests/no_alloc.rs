@@ -6,13 +6,13 @@
 
 mod wire_common;
 
-use rowtone::analyzer::{Analyzer, Collector, Reporter};
 use rowtone::camera::{Line, Pixels, Timing};
 use rowtone::kernel::Kernel;
 use rowtone::link::Link;
+use rowtone::link::settings::Wire;
+use rowtone::link::settings::store::Nowhere;
+use rowtone::pipeline::{Analyzer, Collector, Reporter};
 use rowtone::report::Report;
-use rowtone::settings::Wire;
-use rowtone::settings::store::Nowhere;
 use rowtone::spectrum;
 use rowtone::timeline::{Binner, Group};
 use rowtone::tracker::{self, Config, Outcome, Tracker};

@@ -3,11 +3,11 @@
 //! leaves its type fails here too.
 
 use proptest::{collection, prelude::*, sample};
-use rowtone::analyzer::Analyzer;
-use rowtone::band::Level;
+use rowtone::camera::RawFormat;
 use rowtone::camera::{Line, Pixels, Timing};
 use rowtone::kernel::Kernel;
-use rowtone::raw::RawFormat;
+use rowtone::pipeline::Analyzer;
+use rowtone::reference::band::Level;
 use rowtone::spectrum;
 use rowtone::timeline::{Binner, Displacement, Group};
 use rowtone::tracker::{self, Config, Outcome, Tracker};

@@ -3,11 +3,11 @@
 mod wire_common;
 
 use proptest::prelude::*;
-use rowtone::outbox::Outbox;
+use rowtone::link::outbox::Outbox;
+use rowtone::link::settings::command::LineReader;
+use rowtone::link::settings::store::Nowhere;
+use rowtone::link::settings::{Console, Region, Settings};
 use rowtone::report::Report;
-use rowtone::settings::command::LineReader;
-use rowtone::settings::store::Nowhere;
-use rowtone::settings::{Console, Region, Settings};
 use rowtone::wire::{Message, Reply, SettingsOrigin, text};
 use wire_common::console::LIMITS;
 use wire_common::ordinary_report;

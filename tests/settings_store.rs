@@ -6,7 +6,7 @@ use std::rc::Rc;
 use embedded_storage::nor_flash::{
     ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash, check_erase, check_read, check_write,
 };
-use rowtone::settings::{
+use rowtone::link::settings::{
     Settings,
     store::{Keep, LayoutError, SaveError, Started, Store},
 };

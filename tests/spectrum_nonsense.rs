@@ -1,7 +1,7 @@
 //! No input makes the spectrum panic, and what it then says is finite.
 
-use rowtone::analyzer::Analyzer;
 use rowtone::camera::Timing;
+use rowtone::pipeline::Analyzer;
 use rowtone::report::Report;
 use rowtone::spectrum::{Config, StaticStorage};
 use rowtone::timeline::{Curvature, Group, Sample, Spread};

@@ -2,8 +2,8 @@
 
 use std::f64::consts::TAU;
 
-use rowtone::analyzer::Analyzer;
 use rowtone::camera::Timing;
+use rowtone::pipeline::Analyzer;
 use rowtone::report::{Peak, Report, Warning};
 use rowtone::spectrum::{Config, FrameRatePlan, StaticStorage};
 use rowtone::timeline::{Binner, Displacement, Group, rows_per_sample};

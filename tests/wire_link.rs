@@ -3,8 +3,8 @@
 mod wire_common;
 
 use rowtone::link::Link;
-use rowtone::settings::Wire;
-use rowtone::settings::store::Nowhere;
+use rowtone::link::settings::Wire;
+use rowtone::link::settings::store::Nowhere;
 use rowtone::wire::{Arrival, Message, Sequence, binary, text};
 use wire_common::console::link;
 use wire_common::{Dice, harm, ordinary_report};

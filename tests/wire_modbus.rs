@@ -4,10 +4,11 @@ mod wire_common;
 
 use proptest::prelude::*;
 use rmodbus::{ModbusProto, client::ModbusRequest};
+use rowtone::link::modbus::answer;
+use rowtone::link::settings::store::{Keep, Nowhere, SaveError};
+use rowtone::link::settings::{Console, Region, Settings, Wire};
 use rowtone::report::Report;
-use rowtone::settings::store::{Keep, Nowhere, SaveError};
-use rowtone::settings::{Console, Region, Settings, Wire};
-use rowtone::wire::modbus::{State, answer, decode_report};
+use rowtone::wire::modbus::{State, decode_report};
 use rowtone::wire::{SettingsOrigin, Status};
 use wire_common::ordinary_report;
 

@@ -14,8 +14,8 @@ mod wire_common;
 
 use std::time::Instant;
 
+use rowtone::link::settings::Wire;
 use rowtone::report::Report;
-use rowtone::settings::Wire;
 use rowtone::wire::modbus::decode_report;
 use server::{Server, UNIT, read_holdings, read_inputs, registers, request};
 use wire_common::{Dice, harm, ordinary_report};

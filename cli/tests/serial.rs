@@ -17,7 +17,7 @@ use board::{Board, line};
 use common::{
     CAMERA, assert_failure, assert_the_tone, command, config, file, on_clip, reports, texts, y4m,
 };
-use rowtone::settings::Wire;
+use rowtone::link::settings::Wire;
 use rowtone::wire::{Message, text as wire_text};
 use serialport::{SerialPort, TTYPort};
 

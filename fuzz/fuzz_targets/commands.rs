@@ -2,10 +2,10 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use rowtone::outbox::Outbox;
-use rowtone::settings::command::LineReader;
-use rowtone::settings::store::{Nowhere, Started};
-use rowtone::settings::{Board, Console, Limits, Settings};
+use rowtone::link::outbox::Outbox;
+use rowtone::link::settings::command::LineReader;
+use rowtone::link::settings::store::{Nowhere, Started};
+use rowtone::link::settings::{Board, Console, Limits, Settings};
 use rowtone::wire::{SettingsOrigin, text};
 
 const LIMITS: Limits = Limits { width: 320, height: 240, min_width: 16, max_window_s: 10.0 };

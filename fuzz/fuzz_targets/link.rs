@@ -3,10 +3,10 @@
 
 use libfuzzer_sys::fuzz_target;
 use rowtone::link::Link;
-use rowtone::outbox::Outbox;
+use rowtone::link::outbox::Outbox;
 use rowtone::report::{Report, Warnings};
-use rowtone::settings::store::{Nowhere, Started};
-use rowtone::settings::{Board, Console, Limits, Settings, Wire};
+use rowtone::link::settings::store::{Nowhere, Started};
+use rowtone::link::settings::{Board, Console, Limits, Settings, Wire};
 use rowtone::wire::{Message, SettingsOrigin, binary, text};
 
 const LIMITS: Limits = Limits { width: 320, height: 240, min_width: 16, max_window_s: 10.0 };

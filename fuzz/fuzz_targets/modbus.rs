@@ -2,9 +2,10 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use rowtone::settings::store::{Nowhere, Started};
-use rowtone::settings::{Board, Console, Limits, Settings, Wire};
-use rowtone::wire::modbus::{FrameReader, State, answer, decode_report};
+use rowtone::link::settings::store::{Nowhere, Started};
+use rowtone::link::settings::{Board, Console, Limits, Settings, Wire};
+use rowtone::link::modbus::answer;
+use rowtone::wire::modbus::{FrameReader, State, decode_report};
 use rowtone::wire::{SettingsOrigin, Status};
 
 const LIMITS: Limits = Limits { width: 320, height: 240, min_width: 16, max_window_s: 10.0 };

@@ -3,8 +3,8 @@
 
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash};
 use libfuzzer_sys::fuzz_target;
-use rowtone::settings::Settings;
-use rowtone::settings::store::{Keep, SLOT_LEN, Store};
+use rowtone::link::settings::Settings;
+use rowtone::link::settings::store::{Keep, SLOT_LEN, Store};
 use rowtone::wire::SettingsOrigin;
 
 /// Two slots, erased and written whole; after so many writes the power goes in the middle of one.

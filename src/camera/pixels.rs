@@ -10,10 +10,10 @@ pub enum Pixels<'a> {
     /// 8-bit luma or raw.
     U8(&'a [u8]),
     /// 9- to 16-bit luma or raw, one pixel a word. Packed pixels are unpacked to it
-    /// ([`RawFormat::line`](crate::raw::RawFormat::line)).
+    /// ([`RawFormat::line`](crate::camera::RawFormat::line)).
     U16(&'a [u16]),
     /// The upper eight bits of packed or 16-bit raw pixels
-    /// ([`RawFormat::upper_line`](crate::raw::RawFormat::upper_line)).
+    /// ([`RawFormat::upper_line`](crate::camera::RawFormat::upper_line)).
     Upper(UpperBytes<'a>),
 }
 
@@ -60,7 +60,7 @@ impl<'a> Pixels<'a> {
 }
 
 /// A line of packed or 16-bit pixels of which the upper eight bits count: one byte a pixel, beside bytes that do not.
-/// Made by [`RawFormat::upper_line`](crate::raw::RawFormat::upper_line).
+/// Made by [`RawFormat::upper_line`](crate::camera::RawFormat::upper_line).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct UpperBytes<'a> {
     /// From the first pixel's group on; goes on behind the last where the camera's buffer does.

@@ -3,33 +3,11 @@
 //! A board must not spend a whole row's work in one line time, so the work is a small state machine:
 //! [`Build::advance`] does the next few columns of the present step. On a desktop one call does all.
 
-use super::{RowTable, Two, at_least_1};
-use crate::{
-    align::UNKNOWN_STEPS,
-    band::{HALFWAY, Level, MAX_HALF, SLOPE},
-    kernel::{Kernel, Wide},
-    noise::PixelNoise,
-};
+use super::align::UNKNOWN_STEPS;
+use super::band::{HALFWAY, MAX_HALF, SLOPE};
+use super::{Recipe, RowTable, Two, at_least_1};
+use crate::kernel::{Kernel, Wide};
 use core::ops::Range;
-
-/// How rows become coefficients: the same for all rows of a picture.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Recipe {
-    /// How coarse the band is.
-    pub level: Level,
-    /// Pixels from one to the next of the same colour: 1, or 2 for raw Bayer.
-    pub stride: usize,
-    /// Columns at either edge that the motion may carry out of the picture, px.
-    pub margin_px: usize,
-    /// Noise of one pixel.
-    pub noise: PixelNoise,
-    /// Reference counts in one pixel value.
-    pub counts_per_value: f32,
-    /// Pixel value from which on a pixel is saturated.
-    pub saturation: f32,
-    /// Which implementation of the inner product.
-    pub kernel: Kernel,
-}
 
 /// Rows whose shift is less sure than this are not used, px.
 const WORST_SD_PX: f32 = 0.4;
@@ -495,7 +473,7 @@ impl Build {
             / stride;
         let information = slope * slope / self.noise_power;
         // The reference's own noise makes slopes of about sqrt(Σ h²σ²/frames).
-        let chance = crate::kernel::sqrtf(self.noise_power / self.frames) * 3.0;
+        let chance = crate::math::sqrtf(self.noise_power / self.frames) * 3.0;
         let sure = slope > chance && information * WORST_SD_PX * WORST_SD_PX >= 1.0;
         if !sure || !information.is_finite() {
             return table;

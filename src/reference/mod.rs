@@ -16,13 +16,20 @@
 //! line's is the inverse-compositional form of Gauss–Newton (Baker & Matthews 2004): nothing of it
 //! depends on the line.
 
+pub(crate) mod align;
+pub mod band;
 mod build;
+mod meter;
+pub mod noise;
+mod recipe;
 
 #[cfg(feature = "long-exposure")]
-use crate::band::{Level, SLOPE};
+use band::{Level, SLOPE};
 
 pub(crate) use build::settle;
-pub use build::{Build, Parts, Recipe};
+pub use build::{Build, Parts};
+pub use meter::NoiseMeter;
+pub use recipe::Recipe;
 
 /// What the line path needs of a row besides its coefficients: 16 bytes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -184,7 +191,9 @@ impl Default for RowTable {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{band::Level, kernel::Kernel, noise::PixelNoise};
+    use crate::kernel::Kernel;
+    use band::Level;
+    use noise::PixelNoise;
 
     const WIDTH: usize = 256;
 

@@ -11,7 +11,7 @@ pub(crate) fn threshold(false_alarm: f32, widths: f32, freedom: f32) -> f32 {
     let one = false_alarm.clamp(1e-12, 0.5);
     let mut z = 10.0_f32;
     for _ in 0..4 {
-        z = libm::logf((widths.max(0.0) * crate::kernel::sqrtf(z) + 1.0) / one).max(1.0);
+        z = libm::logf((widths.max(0.0) * crate::math::sqrtf(z) + 1.0) / one).max(1.0);
     }
     libm::expf((2.0 * z / freedom.max(1.0)).min(60.0)) - 1.0
 }

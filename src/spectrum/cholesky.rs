@@ -49,7 +49,7 @@ impl Normal {
         for i in 0..n {
             let d = self.packed[at(i, i)];
             self.scale[i] = if d > 0.0 && d.is_finite() {
-                1.0 / crate::kernel::sqrtf(d)
+                1.0 / crate::math::sqrtf(d)
             } else {
                 0.0
             };
@@ -66,7 +66,7 @@ impl Normal {
                 left -= l * l;
             }
             let pivot = if self.scale[j] > 0.0 && left > 1e-5 {
-                crate::kernel::sqrtf(left)
+                crate::math::sqrtf(left)
             } else {
                 f32::INFINITY
             };

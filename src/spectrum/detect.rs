@@ -7,8 +7,9 @@
 use super::fit::Model;
 use super::fourier::energies;
 use super::model::Samples;
-use super::phase::{Frequency, cos_sin, sin};
+use super::phase::Frequency;
 use super::storage::MAX_GRID;
+use crate::math::{cos_sin, sin};
 
 /// Candidates of one search.
 pub(crate) const CANDIDATES: usize = 4;

@@ -224,7 +224,7 @@ impl Fit {
             .map_or(Complex::new(1.0, 0.0), |t| t.amplitude);
         let size = amplitude.norm_sqr();
         let along = if size > 0.0 {
-            amplitude.unscale(crate::kernel::sqrtf(size))
+            amplitude.unscale(crate::math::sqrtf(size))
         } else {
             Complex::new(1.0, 0.0)
         };
@@ -241,8 +241,8 @@ impl Fit {
             }
         }
         Deviation {
-            hz: crate::kernel::sqrtf(self.normal.variance(&of_hz)),
-            amplitude_px: crate::kernel::sqrtf(self.normal.variance(&of_amplitude)),
+            hz: crate::math::sqrtf(self.normal.variance(&of_hz)),
+            amplitude_px: crate::math::sqrtf(self.normal.variance(&of_amplitude)),
         }
     }
 }

@@ -6,7 +6,7 @@
 use super::model::NO_SKEW;
 use super::storage::EstimatorStorage;
 use super::window::{SampleBuffer, pack_weight, skew_unit_ns, unpack_weight};
-use crate::time::since;
+use crate::math::since;
 use crate::timeline::Group;
 
 /// What a window is, as far as the fit wants to know.

@@ -43,5 +43,4 @@ pub use storage::{EstimatorStorage, StaticStorage, Storage};
 pub use tones::Tones;
 pub use window::{FrameMark, SampleBuffer, WindowMark};
 
-pub(crate) use phase::sin;
 pub(crate) use window::{follow_spread, pack_weight, skew_of};

@@ -3,8 +3,9 @@
 use num_complex::Complex32 as Complex;
 
 use super::blur::blur;
-use super::phase::{Frequency, cos_sin, turns};
+use super::phase::Frequency;
 use super::rows;
+use crate::math::{cos_sin, turns};
 use crate::report::MAX_PEAKS;
 use crate::timeline::Spread;
 

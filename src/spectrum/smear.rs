@@ -41,7 +41,7 @@ pub(crate) struct Correction {
 impl<'a> Smear<'a> {
     pub(crate) fn of(group: &'a Group, curvature: Curvature, model: &Model) -> Self {
         let sizes = model.tones.iter().map(|t| t.amplitude.norm_sqr());
-        let reach_px: f32 = sizes.map(crate::kernel::sqrtf).sum();
+        let reach_px: f32 = sizes.map(crate::math::sqrtf).sum();
         Self {
             group,
             curvature_per_px2: curvature.per_px2(),

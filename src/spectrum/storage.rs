@@ -38,7 +38,7 @@ pub struct EstimatorStorage<'a> {
     pub grid: &'a mut [f32],
 }
 
-/// All that an [`crate::analyzer::Analyzer`] works in.
+/// All that an [`crate::pipeline::Analyzer`] works in.
 #[derive(Debug)]
 pub struct Storage<'a> {
     /// Samples as they come.

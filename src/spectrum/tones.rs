@@ -67,11 +67,11 @@ impl Telling<'_> {
         let mut tones = Tones::nothing(self.fps);
         // Weights have a mean of one, so this is px² already.
         let variance = model.squares / Fit::freedom(samples, model).max(1.0);
-        let noise = crate::kernel::sqrtf(variance);
+        let noise = crate::math::sqrtf(variance);
         if noise.is_finite() {
             tones.sample_noise_px = noise;
             tones.row_noise_px =
-                noise * crate::kernel::sqrtf(f32::from(self.group.rows_per_sample()));
+                noise * crate::math::sqrtf(f32::from(self.group.rows_per_sample()));
         }
         let (low, high) = self.asked_hz();
         let regressors = fit.weigh(samples, model);
@@ -83,7 +83,7 @@ impl Telling<'_> {
             if !(low..=high).contains(&hz) || attenuation < LEAST_ATTENUATION {
                 continue;
             }
-            let amplitude = crate::kernel::sqrtf(tone.amplitude.norm_sqr());
+            let amplitude = crate::math::sqrtf(tone.amplitude.norm_sqr());
             let unit = fit.deviation(&regressors, model, i, samples.length_s);
             // One that changes is no standing deformation, wherever it is.
             let kept = tone.modulated || samples.kept(&samples.frame_means(i + 1)) >= KEPT_ENOUGH;
@@ -96,7 +96,7 @@ impl Telling<'_> {
                 hz,
                 hz_sd: noise * unit.hz,
                 amplitude_px: amplitude_px * smeared.scale,
-                amplitude_px_sd: crate::kernel::sqrtf(sd_px * sd_px + doubt_px * doubt_px),
+                amplitude_px_sd: crate::math::sqrtf(sd_px * sd_px + doubt_px * doubt_px),
                 snr_db: 10.0 * libm::log10f(power.max(1e-9)),
                 ambiguous: self.near_multiple(hz, samples.length_s) || !kept,
                 track: 0,

@@ -5,7 +5,7 @@
 //! costs two multiplications a tone. What is left of a sample's own time (rows of a group weigh
 //! differently from frame to frame) is its skew, kept in small steps and applied to first order.
 
-use crate::time::since;
+use crate::math::since;
 use crate::timeline::{Curvature, Group, Sample, Spread};
 
 /// Samples as they are collected: shift, weight and skew, 8 bytes a sample.

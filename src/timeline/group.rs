@@ -4,7 +4,7 @@ use core::fmt;
 
 use super::Spread;
 use crate::camera::Timing;
-use crate::spectrum::sin;
+use crate::math::sin;
 
 /// How many rows make a sample, so that `max_hz` is sampled well and `capacity` samples hold `frames` frames.
 ///

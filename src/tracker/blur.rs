@@ -14,7 +14,7 @@
 //! (`path/`).
 
 use super::{Stage, Tracker};
-use crate::{camera::Timing, pixel::Pixel, reference::RowTable};
+use crate::{camera::Timing, camera::pixel::Pixel, reference::RowTable};
 
 /// Smears change a shift by less than this, px.
 const MOST_PX: f32 = 0.5;

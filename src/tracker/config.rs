@@ -1,7 +1,7 @@
 //! How a tracker is to work.
 
 use super::Storage;
-use crate::{band::Level, camera::Timing, kernel::Kernel};
+use crate::{camera::Timing, kernel::Kernel, reference::band::Level};
 use core::fmt;
 
 /// How a tracker is to work. Plain data, checked by [`Tracker::new`](super::Tracker::new).

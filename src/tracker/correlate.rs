@@ -6,7 +6,7 @@ use super::{
     row::Row,
 };
 use crate::{
-    pixel::Pixel,
+    camera::pixel::Pixel,
     reference::{RowTable, at_least_1},
 };
 

@@ -6,9 +6,9 @@
 
 use super::{RowLearning, Stage, Tracker};
 use crate::{
-    align::Averaging,
+    camera::pixel::Pixel,
     kernel::Kernel,
-    pixel::Pixel,
+    reference::align::Averaging,
     reference::{Build, Parts, RowTable, settle},
 };
 

@@ -82,7 +82,7 @@ impl Gap {
         let v = self.before[1] - self.mean_before[1];
         let away = ((xy * vv - vy * xv) * x + (vy * xx - xy * xv) * v) / determinant;
         // A tone goes no further than 1.4 of its standard deviations.
-        let most = 2.0 * crate::kernel::sqrtf(self.after2);
+        let most = 2.0 * crate::math::sqrtf(self.after2);
         if away.is_finite() {
             // Not `clamp`: it panics where `most` is no number, and brings the printing of floats with it.
             self.mean_after + away.max(-most).min(most)

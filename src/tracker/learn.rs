@@ -3,12 +3,12 @@
 use super::correlate::{NEAR_PX, NEAR_WHILE_LEARNING_PX};
 use super::{Left, Place, Stage, Tracker, follow::Follow, predict::Prediction, watch::Watch};
 use crate::{
-    align::{self, Averaging},
-    band::{Level, MAX_HALF},
-    noise::NoiseMeter,
-    noise::PixelNoise,
-    pixel::Pixel,
+    camera::pixel::Pixel,
+    reference::NoiseMeter,
     reference::RowTable,
+    reference::align::{self, Averaging},
+    reference::band::{Level, MAX_HALF},
+    reference::noise::PixelNoise,
     timeline::Curvature,
 };
 

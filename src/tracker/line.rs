@@ -12,9 +12,9 @@ use super::{
     row::{Row, Scattered, Summed},
 };
 use crate::{
+    camera::pixel::Pixel,
     camera::{Line, UpperBytes},
     kernel,
-    pixel::Pixel,
     reference::RowTable,
     timeline::{Binner, Sample},
 };

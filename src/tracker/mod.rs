@@ -34,9 +34,10 @@ pub use learn::{ColumnLearning, RowLearning};
 pub use storage::{StaticStorage, Storage};
 
 use crate::{
-    band::Level,
     camera::{Line, Pixels, UpperBytes},
-    noise::{NoiseMeter, PixelNoise},
+    reference::NoiseMeter,
+    reference::band::Level,
+    reference::noise::PixelNoise,
     reference::{Recipe, RowTable},
     timeline::{Begin, Binner, Curvature, Displacement, RowShift, Sample},
 };

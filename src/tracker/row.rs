@@ -1,6 +1,6 @@
 //! A line as the tracker takes it: side by side in memory, or brought together only when it must be.
 
-use crate::{camera::UpperBytes, kernel::Kernel, pixel::Pixel};
+use crate::{camera::UpperBytes, camera::pixel::Pixel, kernel::Kernel};
 
 /// The pixels of a line, as far as most lines need them.
 pub(super) trait Summed {

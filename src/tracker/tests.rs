@@ -2,8 +2,8 @@
 //! noise, blur and real sensors is measured by `rowtone sweep lines` and the end-to-end tests.
 
 use super::*;
-use crate::raw::RawFormat;
-use crate::{band::MAX_HALF, camera::Timing};
+use crate::camera::RawFormat;
+use crate::{camera::Timing, reference::band::MAX_HALF};
 extern crate std;
 use std::{boxed::Box, vec::Vec};
 

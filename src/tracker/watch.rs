@@ -10,7 +10,7 @@ use super::{
     Stage, Tracker,
     overlap::{Overlap, nearest_step},
 };
-use crate::{noise::LEAST_VARIANCE, pixel::Pixel, reference::RowTable};
+use crate::{camera::pixel::Pixel, reference::RowTable, reference::noise::LEAST_VARIANCE};
 
 /// In tracking one row in this many is looked at even if it does not surprise; and where a line time is short.
 const EVERY: usize = 32;

@@ -6,10 +6,10 @@
 )]
 
 use rowtone::link::Link;
-use rowtone::outbox::Outbox;
+use rowtone::link::outbox::Outbox;
+use rowtone::link::settings::store::Started;
+use rowtone::link::settings::{Board, Console, Limits, Settings, Wire};
 use rowtone::report::Report;
-use rowtone::settings::store::Started;
-use rowtone::settings::{Board, Console, Limits, Settings, Wire};
 use rowtone::wire::SettingsOrigin;
 
 /// What the board can do.

@@ -7,10 +7,10 @@
 
 use rmodbus::{ModbusProto, client::ModbusRequest};
 use rowtone::link::Link;
-use rowtone::outbox::Outbox;
+use rowtone::link::outbox::Outbox;
+use rowtone::link::settings::store::Nowhere;
+use rowtone::link::settings::{Settings, Wire};
 use rowtone::report::Report;
-use rowtone::settings::store::Nowhere;
-use rowtone::settings::{Settings, Wire};
 use rowtone::wire::SettingsOrigin;
 
 use crate::wire_common::console::console;

@@ -3,8 +3,8 @@
 use crate::lines::{ClipError, Lines, MAX_WIDTH, Pixels8};
 use core::fmt::{self, Write};
 use cortex_m_rt::entry;
-use rowtone::analyzer::Analyzer;
 use rowtone::camera::{Timing, TimingError};
+use rowtone::pipeline::Analyzer;
 use rowtone::report::Report;
 use rowtone::spectrum;
 use rowtone::timeline::{Binner, BinnerError, Group, Sample};

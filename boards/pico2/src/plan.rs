@@ -5,7 +5,7 @@ use crate::clock::FrameClock;
 use crate::hm01b0;
 use crate::memory::{COLUMNS_PER_LINE, FRAMES, MAX_PASSES, rows_per_sample};
 use rowtone::camera::Timing;
-use rowtone::settings::{Limits, Region, Settings};
+use rowtone::link::settings::{Limits, Region, Settings};
 use rowtone::spectrum;
 use rowtone::timeline::Group;
 use rowtone::tracker;

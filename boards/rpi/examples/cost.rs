@@ -11,9 +11,9 @@
 
 use std::time::Duration;
 
-use rowtone::analyzer::Collector;
+use rowtone::camera::RawFormat;
 use rowtone::camera::{Line, Pixels};
-use rowtone::raw::RawFormat;
+use rowtone::pipeline::Collector;
 use rowtone::timeline::Binner;
 use rowtone::tracker::Tracker;
 use rowtone_rpi::capture::simulated::{Scene, Simulated};

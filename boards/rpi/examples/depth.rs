@@ -8,8 +8,8 @@
 
 use std::f64::consts::TAU;
 
-use rowtone::analyzer::Reporter;
-use rowtone::raw::RawFormat;
+use rowtone::camera::RawFormat;
+use rowtone::pipeline::Reporter;
 use rowtone_rpi::capture::simulated::{Scene, Simulated};
 use rowtone_rpi::capture::{Facts, Frame, Shape, Source};
 use rowtone_rpi::clock::FrameClock;

@@ -2,9 +2,9 @@
 //!
 //! Nothing here waits, and nothing is allocated after [`Lines::new`].
 
-use rowtone::analyzer::Collector;
 use rowtone::camera::{Line, Pixels, UpperBytes};
-use rowtone::raw::{RawError, RawFormat};
+use rowtone::camera::{RawError, RawFormat};
+use rowtone::pipeline::Collector;
 use rowtone::report::{Warning, Warnings};
 use rowtone::spectrum::{self, SampleBuffer};
 use rowtone::timeline::Binner;

@@ -5,10 +5,10 @@ use std::sync::mpsc::{SyncSender, sync_channel};
 use std::time::Duration;
 
 use rowtone::link::Link;
-use rowtone::outbox::Outbox;
+use rowtone::link::outbox::Outbox;
+use rowtone::link::settings::store::{Keep, Nowhere, SaveError, Started, Store};
+use rowtone::link::settings::{Board, Console, Limits, Settings, SettingsError};
 use rowtone::report::Report;
-use rowtone::settings::store::{Keep, Nowhere, SaveError, Started, Store};
-use rowtone::settings::{Board, Console, Limits, Settings, SettingsError};
 use rowtone::wire::SettingsOrigin;
 
 use crate::backoff::Backoff;

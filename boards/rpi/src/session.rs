@@ -9,9 +9,9 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use rowtone::analyzer::{Collector, Reporter};
+use rowtone::link::settings::Settings;
+use rowtone::pipeline::{Collector, Reporter};
 use rowtone::report::{Report, Warnings};
-use rowtone::settings::Settings;
 use rowtone::spectrum::FrameRatePlan;
 
 use crate::capture::{CameraError, Source};

@@ -4,7 +4,7 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 
 use rowtone::camera::{Timing, TimingError};
-use rowtone::settings::{Region, Settings};
+use rowtone::link::settings::{Region, Settings};
 use rowtone::spectrum;
 use rowtone::timeline::{BinnerError, Group, rows_per_sample};
 use rowtone::tracker;
@@ -244,7 +244,7 @@ fn part(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rowtone::raw::RawFormat;
+    use rowtone::camera::RawFormat;
 
     fn facts(id: &str, line_time: Option<(f64, &'static str)>) -> Facts {
         Facts {

@@ -9,7 +9,7 @@ use std::path::Path;
 use embedded_storage::nor_flash::{
     ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash,
 };
-use rowtone::settings::store::SLOT_LEN;
+use rowtone::link::settings::store::SLOT_LEN;
 
 /// A file that behaves as flash does: two slots of [`SLOT_LEN`].
 #[derive(Debug)]
@@ -101,8 +101,8 @@ impl NorFlash for FileFlash {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rowtone::settings::Settings;
-    use rowtone::settings::store::{Keep, Store};
+    use rowtone::link::settings::Settings;
+    use rowtone::link::settings::store::{Keep, Store};
     use rowtone::wire::SettingsOrigin;
 
     #[test]

@@ -7,9 +7,9 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::{Duration, Instant};
 
 use rowtone::link::Link;
+use rowtone::link::settings::Settings;
+use rowtone::link::settings::store::Keep;
 use rowtone::report::Report;
-use rowtone::settings::Settings;
-use rowtone::settings::store::Keep;
 use serialport::SerialPort;
 
 use crate::backoff::Backoff;

@@ -325,7 +325,7 @@ fn the_line_path_allocates_nothing_once_it_runs() {
     let clock = FrameClock::new(None, source.facts().frame_period_ns);
     let mut lines = Lines::new(&setup, clock, tracker.lend(), storage.collected).unwrap();
     let mut reporter =
-        rowtone::analyzer::Reporter::new(setup.spectrum, setup.group, storage.estimator).unwrap();
+        rowtone::pipeline::Reporter::new(setup.spectrum, setup.group, storage.estimator).unwrap();
     // The camera draws its first frame into new memory.
     source.next(Duration::ZERO, &mut |_| {}).unwrap();
     let before = allocations();

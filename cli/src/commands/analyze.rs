@@ -157,15 +157,15 @@ pub fn run(args: &Args) -> Result<(), Failure> {
 }
 
 /// The options that are a board's settings too.
-fn as_a_board_says(args: &Args) -> rowtone::settings::Settings {
-    rowtone::settings::Settings {
+fn as_a_board_says(args: &Args) -> rowtone::link::settings::Settings {
+    rowtone::link::settings::Settings {
         window_s: args.window as f32,
         hop_s: args.hop.unwrap_or(args.window / 2.0) as f32,
         max_peaks: args.max_peaks,
         um_per_px: args.camera.um_per_px.map(|scale| scale as f32),
         min_hz: args.min_hz.map(|hz| hz as f32),
         max_hz: args.max_hz.map(|hz| hz as f32),
-        ..rowtone::settings::Settings::default()
+        ..rowtone::link::settings::Settings::default()
     }
 }
 

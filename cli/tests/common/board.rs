@@ -13,9 +13,9 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use nix::fcntl::{FcntlArg, FdFlag, fcntl};
+use rowtone::link::settings::Wire;
+use rowtone::link::settings::store::Nowhere;
 use rowtone::report::{Peak, Report, Warnings};
-use rowtone::settings::Wire;
-use rowtone::settings::store::Nowhere;
 use rowtone::wire::{Message, text};
 use serialport::{SerialPort, TTYPort};
 

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::io::Write;
 use std::time::{Duration, Instant};
 
-use rowtone::settings::Wire;
+use rowtone::link::settings::Wire;
 use serialport::TTYPort;
 
 use crate::board::{Board, line};

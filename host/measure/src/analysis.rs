@@ -5,8 +5,8 @@
 
 use std::collections::VecDeque;
 
-use rowtone::analyzer::Analyzer;
 use rowtone::camera::Timing;
+use rowtone::pipeline::Analyzer;
 use rowtone::report::{Report, Warning};
 use rowtone::spectrum::Config;
 use rowtone::timeline::{Group, Sample, rows_per_sample};

@@ -14,10 +14,10 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use rowtone::link::Link;
-use rowtone::outbox::Outbox;
+use rowtone::link::outbox::Outbox;
+use rowtone::link::settings::store::{Nowhere, Started};
+use rowtone::link::settings::{Board, Console, Limits, Settings, SettingsError};
 use rowtone::report::Report;
-use rowtone::settings::store::{Nowhere, Started};
-use rowtone::settings::{Board, Console, Limits, Settings, SettingsError};
 use rowtone::wire::SettingsOrigin;
 use serialport::SerialPort;
 

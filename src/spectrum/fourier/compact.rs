@@ -1,6 +1,6 @@
 //! One loop for all sizes, without a table.
 
-use crate::spectrum::phase::cos_sin;
+use crate::math::cos_sin;
 
 /// Real and imaginary part.
 type Bin = [f32; 2];

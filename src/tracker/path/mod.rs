@@ -24,7 +24,7 @@ const SAMPLES: usize = 16;
 const MOST_REACH: usize = 12;
 /// Whole shifts either way that sharpening takes.
 const SHARPEN: usize = 12;
-/// Pixels that [`between`](crate::align::between) takes on either side.
+/// Pixels that [`between`](crate::reference::align::between) takes on either side.
 const TAPS: usize = 4;
 /// Whole shifts either way at which q is taken: two more, as a line need not lie at the nearest.
 const LAGS: usize = MOST_REACH + 2 + TAPS + SHARPEN;

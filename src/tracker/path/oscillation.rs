@@ -5,7 +5,7 @@
 //! an oscillator of that ω, followed by a Kalman filter with fading memory, whose noise is that of the rows alone: over the
 //! rows of an exposure a speed is known far better than from its last four.
 
-use crate::kernel::sqrtf;
+use crate::math::sqrtf;
 
 /// Rows that are kept: twice the largest B, and one.
 const RING: usize = 32;

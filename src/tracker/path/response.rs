@@ -2,9 +2,9 @@
 
 use super::{LAGS, LEAST_SLOPE, MOST_PX, SAMPLES, SHARP, TAPS};
 use crate::{
-    align::between,
-    pixel::Pixel,
+    camera::pixel::Pixel,
     reference::RowTable,
+    reference::align::between,
     tracker::{RowLearning, Stage, Tracker, correlate::part, overlap::Overlap},
 };
 

@@ -9,8 +9,8 @@ use embassy_rp::Peri;
 use embassy_rp::flash::{Blocking, Flash};
 use embassy_rp::peripherals::FLASH;
 use embassy_sync::blocking_mutex::Mutex;
-use rowtone::settings::Settings;
-use rowtone::settings::store::{Keep, SaveError, Started, Store};
+use rowtone::link::settings::Settings;
+use rowtone::link::settings::store::{Keep, SaveError, Started, Store};
 use rowtone::wire::SettingsOrigin;
 
 /// The Pico 2's flash.

@@ -6,7 +6,7 @@ use super::shared::{
 use super::{Picture, compute};
 use core::sync::atomic::Ordering;
 use rowtone::camera::{Line, Pixels};
-use rowtone::settings::Region;
+use rowtone::link::settings::Region;
 use rowtone::timeline::{Binner, Sample};
 use rowtone::tracker::{Stage, Tracker};
 use rowtone_pico2::handover::{LineBuffer, Taker, count};

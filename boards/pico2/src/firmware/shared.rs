@@ -4,7 +4,7 @@ use core::cell::RefCell;
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use embassy_sync::blocking_mutex::{Mutex, raw::CriticalSectionRawMutex};
 use embassy_sync::signal::Signal;
-use rowtone::settings::Settings;
+use rowtone::link::settings::Settings;
 use rowtone_pico2::frames::Frames;
 use rowtone_pico2::handover::LineLosses;
 use rowtone_pico2::health::State;

@@ -1,12 +1,12 @@
 //! libcamera's names of pixel formats, as far as lines can be read from them.
 
-use rowtone::raw::RawFormat;
+use rowtone::camera::RawFormat;
 
 /// How the first plane of a format is read, and whether its neighbouring pixels differ in colour. `None` for
 /// what cannot be read: compressed raw (`…_PISP_COMP1`), packed colour.
 ///
 /// ```
-/// use rowtone::raw::RawFormat;
+/// use rowtone::camera::RawFormat;
 /// use rowtone_rpi::capture::format::read_as;
 /// assert_eq!(read_as("SRGGB10_CSI2P"), Some((RawFormat::Packed10, true)));
 /// assert_eq!(read_as("NV12"), Some((RawFormat::Raw8, false)));

@@ -13,7 +13,7 @@ mod v4l2;
 use std::fmt;
 use std::time::Duration;
 
-use rowtone::raw::RawFormat;
+use rowtone::camera::RawFormat;
 
 /// How a frame lies in memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

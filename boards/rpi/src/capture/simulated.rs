@@ -6,7 +6,7 @@
 use std::f64::consts::TAU;
 use std::time::Duration;
 
-use rowtone::raw::RawFormat;
+use rowtone::camera::RawFormat;
 
 use super::{CameraError, Facts, Frame, Shape, Source};
 

@@ -4,8 +4,8 @@ use std::fmt::Display;
 use std::ops::RangeInclusive;
 use std::path::PathBuf;
 
+use rowtone::link::settings::{Region, Wire};
 use rowtone::report::MAX_PEAKS;
-use rowtone::settings::{Region, Wire};
 use serde::Deserialize;
 use toml::Spanned;
 

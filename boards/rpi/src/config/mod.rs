@@ -1,6 +1,6 @@
 //! The one configuration file: TOML, read once, checked whole.
 //!
-//! An error names file, line and key. What a host changes over the line ([`rowtone::settings`]) starts
+//! An error names file, line and key. What a host changes over the line ([`rowtone::link::settings`]) starts
 //! from here.
 
 mod file;
@@ -8,7 +8,7 @@ mod file;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-use rowtone::settings::Settings;
+use rowtone::link::settings::Settings;
 
 use crate::mode::Wish;
 

@@ -1,7 +1,7 @@
 //! A recording through the real tracker, and its figures.
 
-use rowtone::analyzer::Analyzer;
 use rowtone::camera::Line;
+use rowtone::pipeline::Analyzer;
 use rowtone::spectrum;
 use rowtone::timeline::{Binner, Displacement, Group, rows_per_sample};
 use rowtone::tracker::{Config, ConfigError, Outcome, Tracker};

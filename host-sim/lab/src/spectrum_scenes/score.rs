@@ -1,6 +1,6 @@
 //! The analyzer's answer beside the truth.
 
-use rowtone::analyzer::Analyzer;
+use rowtone::pipeline::Analyzer;
 use rowtone::report::{Peak, Report};
 use rowtone::spectrum::Config;
 

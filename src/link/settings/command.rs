@@ -20,7 +20,7 @@ use heapless::String;
 
 use super::real::whole;
 use super::{Key, Settings, SettingsError, ValueError};
-use crate::outbox::ResendError;
+use crate::link::outbox::ResendError;
 use crate::wire::text::command_in_sentence;
 
 /// Longest command line, bytes.

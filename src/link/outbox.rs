@@ -69,7 +69,7 @@ impl core::error::Error for ResendError {}
 /// The reports of one session, the newest and as many before it as there are slots.
 ///
 /// ```
-/// use rowtone::outbox::Outbox;
+/// use rowtone::link::outbox::Outbox;
 /// # use rowtone::report::{Report, Warnings};
 /// # let report = |seq| Report { seq, time_ms: 0, window_s: 1.0, fps: 60.0, lines: 0, lost_frames: 0,
 /// #     noise_px: 0.0, peaks: Default::default(), warnings: Warnings(0), um_per_px: None,

@@ -1,11 +1,11 @@
 //! The computing side: a window handed over becomes a report.
 
+use crate::math::since;
 use crate::report::{Report, Warning, Warnings};
 use crate::spectrum::{
     Config, ConfigError, Estimator, EstimatorStorage, Follower, SampleBuffer, Tones, WindowMark,
     name_harmonics,
 };
-use crate::time::since;
 use crate::timeline::Group;
 
 /// Makes reports of windows.
@@ -114,5 +114,5 @@ fn band_velocity(tones: &Tones, um_per_px: f32) -> f32 {
         let speed = core::f32::consts::TAU * peak.hz * mm;
         squares += 0.5 * speed * speed;
     }
-    crate::kernel::sqrtf(squares)
+    crate::math::sqrtf(squares)
 }

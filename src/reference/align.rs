@@ -1,10 +1,8 @@
 //! A line shifted back by its own displacement, averaged into its reference.
 
-use crate::{
-    kernel::{self, Kernel, Wide},
-    pixel::Pixel,
-    reference::Recipe,
-};
+use super::Recipe;
+use crate::camera::pixel::Pixel;
+use crate::kernel::{self, Kernel, Wide};
 use core::ops::Range;
 
 /// Shifts smaller than this blur nothing: the line is averaged in as it is, px.
@@ -258,12 +256,12 @@ mod tests {
 
     #[test]
     fn some_columns_at_a_time_are_the_whole_line() {
-        use crate::pixel::Pixel;
+        use crate::camera::pixel::Pixel;
         let recipe = Recipe {
-            level: crate::band::Level::Fine,
+            level: crate::reference::band::Level::Fine,
             stride: 1,
             margin_px: 0,
-            noise: crate::noise::PixelNoise::guess(256.0),
+            noise: crate::reference::noise::PixelNoise::guess(256.0),
             counts_per_value: 128.0,
             saturation: 254.0,
             kernel: crate::kernel::Kernel::PORTABLE,
@@ -288,10 +286,10 @@ mod tests {
     #[test]
     fn a_line_that_is_nowhere_near_leaves_the_mean_alone() {
         let recipe = |stride| Recipe {
-            level: crate::band::Level::Fine,
+            level: crate::reference::band::Level::Fine,
             stride,
             margin_px: 0,
-            noise: crate::noise::PixelNoise::guess(256.0),
+            noise: crate::reference::noise::PixelNoise::guess(256.0),
             counts_per_value: 128.0,
             saturation: 254.0,
             kernel: crate::kernel::Kernel::PORTABLE,

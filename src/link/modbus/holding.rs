@@ -1,8 +1,8 @@
 //! Holding registers: the settings.
 
-use crate::settings::{Region, Settings, Wire};
+use crate::link::settings::{Region, Settings, Wire};
 
-use super::half;
+use crate::wire::modbus::half;
 
 /// How many there are.
 pub const HOLDING_LEN: u16 = 20;

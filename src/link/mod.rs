@@ -3,16 +3,21 @@
 //! Three calls, none of which waits: [`Link::receive`] takes each byte that came, [`Link::poll`]
 //! says which bytes to send, [`Link::sent`] how many of them the line took. Measuring hands over
 //! each report with [`Link::push`] and never waits for the line: a slow or stuck one drops the
-//! oldest report and counts it ([`crate::outbox`]).
+//! oldest report and counts it ([`crate::link::outbox`]).
 
 use heapless::{Deque, Vec};
 
-use crate::outbox::Outbox;
+pub mod modbus;
+pub mod outbox;
+pub mod settings;
+
 use crate::report::Report;
-use crate::settings::command::LineReader;
-use crate::settings::store::Keep;
-use crate::settings::{Console, Wire};
-use crate::wire::{Message, binary, modbus, text};
+use crate::wire::modbus::{FrameReader, State};
+use crate::wire::{Message, binary, text};
+use outbox::Outbox;
+use settings::command::LineReader;
+use settings::store::Keep;
+use settings::{Console, Wire};
 
 /// Most answers that can wait for the line. A command that comes while so many wait is refused.
 pub const MAX_ANSWERS: usize = 2;
@@ -20,8 +25,8 @@ pub const MAX_ANSWERS: usize = 2;
 /// One serial line.
 ///
 /// ```
-/// use rowtone::{link::Link, outbox::Outbox};
-/// use rowtone::settings::{Board, Console, Limits, Settings, store::{Nowhere, Started}};
+/// use rowtone::link::{Link, outbox::Outbox};
+/// use rowtone::link::settings::{Board, Console, Limits, Settings, store::{Nowhere, Started}};
 /// use rowtone::wire::SettingsOrigin;
 ///
 /// let board = Board {
@@ -40,14 +45,14 @@ pub const MAX_ANSWERS: usize = 2;
 /// let all = line.len();
 /// link.sent(all);
 /// assert!(link.poll(0, &mut Nowhere).is_empty());
-/// # Ok::<(), rowtone::settings::SettingsError>(())
+/// # Ok::<(), rowtone::link::settings::SettingsError>(())
 /// ```
 #[derive(Debug)]
 pub struct Link<'a> {
     console: Console,
     outbox: Outbox<'a>,
     lines: LineReader,
-    frames: modbus::FrameReader,
+    frames: FrameReader,
     answers: Deque<Message, MAX_ANSWERS>,
     /// What is being sent, and how much of it the line has taken.
     buffer: Vec<u8, { text::MAX_LINE }>,
@@ -61,7 +66,7 @@ impl<'a> Link<'a> {
             console,
             outbox,
             lines: LineReader::new(),
-            frames: modbus::FrameReader::new(baud),
+            frames: FrameReader::new(baud),
             answers: Deque::new(),
             buffer: Vec::new(),
             taken: 0,
@@ -162,7 +167,7 @@ impl<'a> Link<'a> {
             return;
         };
         let status = self.console.status(now_us / 1000, &self.outbox);
-        let state = modbus::State {
+        let state = State {
             status: &status,
             report: self.outbox.newest(),
         };

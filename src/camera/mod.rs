@@ -1,8 +1,11 @@
 //! What a camera delivers: lines, and when each was exposed.
 
+pub(crate) mod pixel;
 mod pixels;
+mod raw;
 
 pub use pixels::{Pixels, UpperBytes};
+pub use raw::{RawError, RawFormat};
 
 use core::fmt;
 

@@ -2,7 +2,7 @@
 
 use core::fmt::{self, Write};
 
-use crate::outbox::Outbox;
+use crate::link::outbox::Outbox;
 use crate::wire::{Message, Reply, SettingsOrigin, Status, binary};
 
 use super::command::{Command, CommandError, parse};
@@ -23,8 +23,8 @@ pub struct Board {
 /// The settings in use, and who may change them.
 ///
 /// ```
-/// use rowtone::outbox::Outbox;
-/// use rowtone::settings::{Board, Console, Limits, Settings, store::{Nowhere, Started}};
+/// use rowtone::link::outbox::Outbox;
+/// use rowtone::link::settings::{Board, Console, Limits, Settings, store::{Nowhere, Started}};
 /// use rowtone::wire::{Message, SettingsOrigin};
 ///
 /// let board = Board {
@@ -44,7 +44,7 @@ pub struct Board {
 /// let said = console.carry_out("set window 0.1", 13_000, &mut outbox, &mut Nowhere);
 /// let Message::Reply(reply) = said else { panic!() };
 /// assert_eq!(reply.text, "hop is 0.25 s; give 0.01 to the window's length, 0.1; nothing was changed");
-/// # Ok::<(), rowtone::settings::SettingsError>(())
+/// # Ok::<(), rowtone::link::settings::SettingsError>(())
 /// ```
 #[derive(Clone, Debug)]
 pub struct Console {

@@ -21,12 +21,12 @@ impl RawFormat {
     /// noise of 0.29 of an eight-bit step, well below the light's own noise unless the picture is dark.
     ///
     /// ```
-    /// use rowtone::{camera::Pixels, raw::RawFormat};
+    /// use rowtone::camera::{Pixels, RawFormat};
     ///
     /// let bytes = [0x80, 0x00, 0xff, 0x01, 0b11_10_01_00]; // four pixels of 10 bits
     /// let line = RawFormat::Packed10.upper_line(&bytes, 4, &mut [])?;
     /// assert!(line.values().eq([0x80, 0x00, 0xff, 0x01]));
-    /// # Ok::<(), rowtone::raw::RawError>(())
+    /// # Ok::<(), rowtone::camera::RawError>(())
     /// ```
     ///
     /// # Errors

@@ -2,12 +2,11 @@
 
 use heapless::Vec;
 
-use crate::settings::Console;
-use crate::settings::store::Keep;
+use crate::link::settings::Console;
+use crate::link::settings::store::Keep;
 
 use super::holding::{COMMAND_AT, HOLDING_LEN, Image, cuts_a_value};
-use super::input::State;
-use super::{CRC, MAX_FRAME};
+use crate::wire::modbus::{CRC, MAX_FRAME, State};
 
 /// Why a request is refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,9 +26,9 @@ pub enum Exception {
 /// Most registers read at once.
 const MAX_READ: u16 = 125;
 
-/// Answers one frame ([`super::FrameReader`] finds it) into `response`, which comes back empty where there
+/// Answers one frame ([`FrameReader`](crate::wire::modbus::FrameReader) finds it) into `response`, which comes back empty where there
 /// is nothing to answer: the CRC is wrong, another server is meant, or all are (unit 0; writes are
-/// carried out then). The unit listened to is [`crate::settings::Settings::unit`].
+/// carried out then). The unit listened to is [`crate::link::settings::Settings::unit`].
 pub fn answer(
     frame: &[u8],
     state: &State<'_>,

@@ -20,7 +20,7 @@ use crate::timeline::{Group, Sample};
 /// Collects and computes, one after the other.
 ///
 /// ```
-/// use rowtone::analyzer::Analyzer;
+/// use rowtone::pipeline::Analyzer;
 /// use rowtone::camera::Timing;
 /// use rowtone::spectrum::{Config, StaticStorage};
 /// use rowtone::timeline::{Group, Sample};

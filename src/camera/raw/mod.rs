@@ -12,13 +12,13 @@
 //! Raspberry Pi 5 shifts every depth up to that). 8-bit lines are read where they are.
 //!
 //! ```
-//! use rowtone::{camera::Pixels, raw::RawFormat};
+//! use rowtone::camera::{Pixels, RawFormat};
 //!
 //! let bytes = [0x80, 0x00, 0xff, 0x01, 0b11_10_01_00]; // as the camera writes them
 //! let mut words = [0; 4];
 //! let line = RawFormat::Packed10.line(&bytes, 4, &mut words)?;
 //! assert_eq!(line, Pixels::U16(&[0x200, 0x001, 0x3fe, 0x007]));
-//! # Ok::<(), rowtone::raw::RawError>(())
+//! # Ok::<(), rowtone::camera::RawError>(())
 //! ```
 
 mod upper;

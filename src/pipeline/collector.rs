@@ -1,10 +1,10 @@
 //! The line side: a ring of frames, and when a window is complete.
 
 use super::Reporter;
+use crate::math::since;
 use crate::spectrum::{
     Config, ConfigError, FrameMark, SampleBuffer, WindowMark, follow_spread, pack_weight, skew_of,
 };
-use crate::time::since;
 use crate::timeline::{Curvature, Group, Sample, Spread};
 
 /// Collects samples to windows.

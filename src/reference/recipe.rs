@@ -1,0 +1,24 @@
+//! How rows become coefficients.
+
+use super::band::Level;
+use super::noise::PixelNoise;
+use crate::kernel::Kernel;
+
+/// How rows become coefficients: the same for all rows of a picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Recipe {
+    /// How coarse the band is.
+    pub level: Level,
+    /// Pixels from one to the next of the same colour: 1, or 2 for raw Bayer.
+    pub stride: usize,
+    /// Columns at either edge that the motion may carry out of the picture, px.
+    pub margin_px: usize,
+    /// Noise of one pixel.
+    pub noise: PixelNoise,
+    /// Reference counts in one pixel value.
+    pub counts_per_value: f32,
+    /// Pixel value from which on a pixel is saturated.
+    pub saturation: f32,
+    /// Which implementation of the inner product.
+    pub kernel: Kernel,
+}
