@@ -14,13 +14,19 @@ use rowtone_failure::Failure;
 
 pub mod analyze;
 pub mod calibrate;
+#[cfg(feature = "lab")]
 pub mod compare;
 pub mod demo;
 pub mod displacement;
+#[cfg(feature = "lab")]
 pub mod experiments;
+#[cfg(feature = "gateway")]
 pub mod gateway;
+#[cfg(any(test, not(all(feature = "gateway", feature = "lab"))))]
+mod missing;
 pub mod monitor;
 pub mod simulate;
+#[cfg(feature = "lab")]
 pub mod sweep;
 
 /// Measures vibration with a rolling-shutter camera: every row of a frame is a sample in time.
@@ -48,17 +54,33 @@ enum Command {
     /// Decodes what a board sends over a serial port
     Monitor(monitor::Args),
     /// Sends the reports of many boards to an MQTT broker
+    #[cfg(feature = "gateway")]
     Gateway(gateway::Args),
+    /// Sends the reports of many boards to an MQTT broker (needs `--features gateway`)
+    #[cfg(not(feature = "gateway"))]
+    Gateway(missing::Args),
     /// Writes a simulated clip, with the truth beside it
     Simulate(simulate::Args),
     /// Line time, read-out, blank time and exposure of a camera, from a flashing light
     Calibrate(calibrate::Args),
     /// Measures the project's own figures anew, from a seed
+    #[cfg(feature = "lab")]
     Sweep(sweep::Args),
     /// Runs every method on the same simulated clip and prints one table
+    #[cfg(feature = "lab")]
     Compare(compare::Args),
     /// Makes the tables and sounds of docs/results.md anew
+    #[cfg(feature = "lab")]
     Experiments(experiments::Args),
+    /// Measures the project's own figures anew, from a seed (needs `--features lab`)
+    #[cfg(not(feature = "lab"))]
+    Sweep(missing::Args),
+    /// Runs every method on the same simulated clip and prints one table (needs `--features lab`)
+    #[cfg(not(feature = "lab"))]
+    Compare(missing::Args),
+    /// Makes the tables and sounds of docs/results.md anew (needs `--features lab`)
+    #[cfg(not(feature = "lab"))]
+    Experiments(missing::Args),
 }
 
 fn run(command: &Command) -> Result<(), Failure> {
@@ -67,12 +89,24 @@ fn run(command: &Command) -> Result<(), Failure> {
         Command::Analyze(args) => analyze::run(args),
         Command::Displacement(args) => displacement::run(args),
         Command::Monitor(args) => monitor::run(args),
+        #[cfg(feature = "gateway")]
         Command::Gateway(args) => gateway::run(args),
+        #[cfg(not(feature = "gateway"))]
+        Command::Gateway(args) => missing::run(args, "gateway", "gateway"),
         Command::Simulate(args) => simulate::run(args),
         Command::Calibrate(args) => calibrate::run(args),
+        #[cfg(feature = "lab")]
         Command::Sweep(args) => sweep::run(args),
+        #[cfg(feature = "lab")]
         Command::Compare(args) => compare::run(args),
+        #[cfg(feature = "lab")]
         Command::Experiments(args) => experiments::run(args),
+        #[cfg(not(feature = "lab"))]
+        Command::Sweep(args) => missing::run(args, "sweep", "lab"),
+        #[cfg(not(feature = "lab"))]
+        Command::Compare(args) => missing::run(args, "compare", "lab"),
+        #[cfg(not(feature = "lab"))]
+        Command::Experiments(args) => missing::run(args, "experiments", "lab"),
     }
 }
 
