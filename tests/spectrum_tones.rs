@@ -224,7 +224,7 @@ fn two_frame_rates_hide_nothing() {
     };
     for report in one.report(Config::default(), 1, motion) {
         assert!(report.peaks.is_empty());
-        assert_ne!(report.warnings.0 & Warning::HiddenNearFrameRate as u16, 0);
+        assert!(report.warnings.contains(Warning::HiddenNearFrameRate));
     }
     let plan = FrameRatePlan::new(60.0, 1.0, 1000.0).unwrap();
     let mut starts_s = vec![0.0];
@@ -244,7 +244,7 @@ fn two_frame_rates_hide_nothing() {
         assert!(!peak.ambiguous);
         assert!((peak.hz - 180.0).abs() < 5.0 * peak.hz_sd && peak.hz_sd < 0.002);
         assert!((peak.amplitude_px - 0.2).abs() < 5.0 * peak.amplitude_px_sd);
-        assert_eq!(report.warnings.0 & Warning::HiddenNearFrameRate as u16, 0);
+        assert!(!report.warnings.contains(Warning::HiddenNearFrameRate));
     }
 }
 
@@ -269,8 +269,8 @@ fn every_window_is_reported_once() {
         let reports = camera.report(Config::default(), 1, |t| 0.1 * (TAU * 33.0 * t).cos());
         let ends: Vec<u64> = reports.iter().map(|r| (r.time_ms + 1) / 10 * 10).collect();
         assert_eq!(ends, ends_ms, "{frames} frames");
-        let short = reports[0].warnings.0 & Warning::ShortWindow as u16;
-        assert_eq!(short != 0, frames < 60, "{frames} frames");
+        let short = reports[0].warnings.contains(Warning::ShortWindow);
+        assert_eq!(short, frames < 60, "{frames} frames");
         assert!(
             reports
                 .iter()

@@ -33,7 +33,7 @@ fn messages() -> Vec<Message> {
     let mut second = ordinary_report(300);
     second.peaks[1].harmonic = Some(2);
     second.peaks[2].ambiguous = true;
-    second.warnings.0 = 0x00A1;
+    second.warnings = 0x00A1.into();
     second.velocity_mm_s_rms = None;
     vec![
         Message::Report {

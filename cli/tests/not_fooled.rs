@@ -149,10 +149,7 @@ fn a_hand_is_flagged_and_forgotten_within_a_second() {
     });
     let reports = analyzed("hand", waving, &["--roi", "full"]);
     assert_eq!(reports.len(), 5);
-    let flagged: Vec<bool> = reports
-        .iter()
-        .map(|r| has_warning(r, "disturbed"))
-        .collect();
+    let flagged: Vec<bool> = reports.iter().map(|r| has_warning(r, "occluded")).collect();
     // Told with every window that saw it, the fourth of them its last tenth of a second.
     assert_eq!(flagged, [false, true, true, true, false]);
     assert!(reports.iter().all(|r| !has_warning(r, "relearned")));
@@ -281,7 +278,7 @@ fn a_sky_over_a_swift_picture_is_no_disturbance() {
     let args = [&["analyze", path, "--format", "json"], &camera[..]];
     let output = command(args.concat()).output().expect("it runs");
     let report = reports(&texts(&output).0).remove(0);
-    assert!(!has_warning(&report, "disturbed"), "{report}");
+    assert!(!has_warning(&report, "occluded"), "{report}");
     assert!(
         (amplitude_px(&report, 203.7) / 4.0 - 1.0).abs() < 0.01,
         "{report}"

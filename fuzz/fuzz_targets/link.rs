@@ -4,7 +4,7 @@
 use libfuzzer_sys::fuzz_target;
 use rowtone::link::Link;
 use rowtone::link::outbox::Outbox;
-use rowtone::report::{Report, Warnings};
+use rowtone::report::Report;
 use rowtone::link::settings::store::{Nowhere, Started};
 use rowtone::link::settings::{Board, Console, Limits, Settings, Wire};
 use rowtone::wire::{Message, SettingsOrigin, binary, text};
@@ -13,17 +13,12 @@ const LIMITS: Limits = Limits { width: 320, height: 240, min_width: 16, max_wind
 
 fn report() -> Report {
     Report {
-        seq: 0,
         time_ms: 1000,
         window_s: 1.0,
         fps: 60.0,
         lines: 18_000,
-        lost_frames: 0,
         noise_px: 0.01,
-        peaks: heapless::Vec::new(),
-        warnings: Warnings(0),
-        um_per_px: None,
-        velocity_mm_s_rms: None,
+        ..Report::EMPTY
     }
 }
 

@@ -70,10 +70,8 @@ impl core::error::Error for ResendError {}
 ///
 /// ```
 /// use rowtone::link::outbox::Outbox;
-/// # use rowtone::report::{Report, Warnings};
-/// # let report = |seq| Report { seq, time_ms: 0, window_s: 1.0, fps: 60.0, lines: 0, lost_frames: 0,
-/// #     noise_px: 0.0, peaks: Default::default(), warnings: Warnings(0), um_per_px: None,
-/// #     velocity_mm_s_rms: None };
+/// # use rowtone::report::Report;
+/// # let report = |seq| Report { seq, ..Report::EMPTY };
 /// let mut slots = [const { None }; 2];
 /// let mut outbox = Outbox::new(&mut slots);
 /// for seq in 0..3 {
@@ -233,23 +231,13 @@ mod tests {
     extern crate std;
 
     use super::*;
-    use crate::report::Warnings;
     use proptest::prelude::*;
     use std::vec::Vec;
 
     fn report() -> Report {
         Report {
             seq: 77,
-            time_ms: 0,
-            window_s: 1.0,
-            fps: 60.0,
-            lines: 0,
-            lost_frames: 0,
-            noise_px: 0.0,
-            peaks: heapless::Vec::new(),
-            warnings: Warnings(0),
-            um_per_px: None,
-            velocity_mm_s_rms: None,
+            ..Report::EMPTY
         }
     }
 

@@ -88,18 +88,12 @@ impl<'a> Reporter<'a> {
 }
 
 fn warnings(mark: &WindowMark, tones: &Tones) -> Warnings {
-    let mut bits = 0;
-    for (met, warning) in [
-        (tones.hidden, Warning::HiddenNearFrameRate),
-        (mark.lost_frames > 0, Warning::LostFrames),
-        (mark.short, Warning::ShortWindow),
-        (tones.more, Warning::MoreTones),
-    ] {
-        if met {
-            bits |= warning as u16;
-        }
-    }
-    Warnings(bits)
+    let mut warnings = Warnings::NONE;
+    warnings.insert_if(tones.hidden, Warning::HiddenNearFrameRate);
+    warnings.insert_if(mark.lost_frames > 0, Warning::LostFrames);
+    warnings.insert_if(mark.short, Warning::ShortWindow);
+    warnings.insert_if(tones.more, Warning::MoreTones);
+    warnings
 }
 
 /// Velocity of the peaks within 10–1000 Hz, mm/s RMS: √Σ(2πfA)²/2 (ISO 20816-1).

@@ -1,7 +1,11 @@
 //! What is said about one window of time, in which units.
 
+mod warnings;
+
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
+
+pub use warnings::{Warning, Warnings};
 
 /// Most peaks one report can hold.
 pub const MAX_PEAKS: usize = 16;
@@ -26,38 +30,6 @@ pub struct Peak {
     /// Which harmonic of the running speed, from 1, where one running speed explains it.
     pub harmonic: Option<u8>,
 }
-
-/// Something the reader should know about a window. One bit each, see [`Warnings`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u16)]
-pub enum Warning {
-    /// A vibration near a multiple of the frame rate could hide in this window.
-    HiddenNearFrameRate = 1 << 0,
-    /// Frames were lost.
-    LostFrames = 1 << 1,
-    /// The window is shorter than asked for.
-    ShortWindow = 1 << 2,
-    /// Rows were flagged: something passed through the picture.
-    Disturbed = 1 << 3,
-    /// The scene changed and the reference was learned anew.
-    Relearned = 1 << 4,
-    /// Less than half of the rows have texture to measure.
-    LittleTexture = 1 << 5,
-    /// There were more tones than the report holds.
-    MoreTones = 1 << 6,
-    /// The picture is too dark or saturated in most rows.
-    BadLight = 1 << 7,
-    /// The first report since the watchdog reset the board.
-    WatchdogReset = 1 << 8,
-    /// The first report since the board's firmware failed and reset it.
-    PanicReset = 1 << 9,
-    /// The first report since the board was told to start anew.
-    CommandReset = 1 << 10,
-}
-
-/// A set of [`Warning`]s.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Warnings(pub u16);
 
 /// One window of time, as a board sends it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -84,4 +56,27 @@ pub struct Report {
     pub um_per_px: Option<f32>,
     /// Velocity over 10–1000 Hz, mm/s RMS (ISO 20816's quantity), where there is a scale.
     pub velocity_mm_s_rms: Option<f32>,
+}
+
+impl Report {
+    /// The report of nothing: no time, no rows, no peaks, no warnings.
+    pub const EMPTY: Self = Self {
+        seq: 0,
+        time_ms: 0,
+        window_s: 0.0,
+        fps: 0.0,
+        lines: 0,
+        lost_frames: 0,
+        noise_px: 0.0,
+        peaks: Vec::new(),
+        warnings: Warnings::NONE,
+        um_per_px: None,
+        velocity_mm_s_rms: None,
+    };
+}
+
+impl Default for Report {
+    fn default() -> Self {
+        Self::EMPTY
+    }
 }

@@ -43,7 +43,7 @@ prop_compose! {
         Report {
             seq, time_ms, window_s, fps, lines, lost_frames, noise_px,
             peaks: peaks.into_iter().collect(),
-            warnings: Warnings(warnings), um_per_px, velocity_mm_s_rms,
+            warnings: Warnings::from(warnings), um_per_px, velocity_mm_s_rms,
         }
     }
 }
@@ -109,7 +109,7 @@ pub fn ordinary_report(seq: u32) -> Report {
         ]
         .into_iter()
         .collect(),
-        warnings: Warnings(0),
+        warnings: Warnings::NONE,
         um_per_px: Some(50.0),
         velocity_mm_s_rms: Some(4.4512),
     }

@@ -23,12 +23,12 @@ impl ResetCause {
     /// What the first report says of it; how often the board has started is the report's session. That power came needs
     /// no warning.
     pub const fn warnings(self) -> Warnings {
-        Warnings(match self {
-            Self::PowerOn => 0,
-            Self::Watchdog => Warning::WatchdogReset as u16,
-            Self::Panic => Warning::PanicReset as u16,
-            Self::Command => Warning::CommandReset as u16,
-        })
+        match self {
+            Self::PowerOn => Warnings::NONE,
+            Self::Watchdog => Warnings::of(Warning::WatchdogReset),
+            Self::Panic => Warnings::of(Warning::PanicReset),
+            Self::Command => Warnings::of(Warning::CommandReset),
+        }
     }
 }
 
@@ -115,7 +115,7 @@ impl FirstReport {
 
     /// Call it with each report, in the order in which they are sent.
     pub fn marked(&mut self, mut report: Report) -> Report {
-        report.warnings.0 |= core::mem::take(&mut self.untold).0;
+        report.warnings = report.warnings.union(core::mem::take(&mut self.untold));
         report
     }
 }
@@ -191,34 +191,30 @@ mod tests {
         let panic = Boot::new(panicking(watchdog.scratch()));
         let command = Boot::new(restarting(panic.scratch()));
         let causes = [
-            (power_on, 0),
-            (watchdog, Warning::WatchdogReset as u16),
-            (panic, Warning::PanicReset as u16),
-            (command, Warning::CommandReset as u16),
+            (power_on, Warnings::NONE),
+            (watchdog, Warnings::of(Warning::WatchdogReset)),
+            (panic, Warnings::of(Warning::PanicReset)),
+            (command, Warnings::of(Warning::CommandReset)),
         ];
         for (boot, warning) in causes {
             let mut first = FirstReport::new(&boot);
-            for expected in [warning, 0, 0] {
-                let lost = Warning::LostFrames as u16;
+            for expected in [warning, Warnings::NONE, Warnings::NONE] {
+                let lost = Warnings::of(Warning::LostFrames);
                 let report = first.marked(report(lost));
-                assert_eq!(report.warnings.0, lost | expected, "{boot}");
+                assert_eq!(report.warnings, lost.union(expected), "{boot}");
             }
         }
     }
 
-    fn report(warnings: u16) -> Report {
+    fn report(warnings: Warnings) -> Report {
         Report {
-            seq: 0,
             time_ms: 1000,
             window_s: 1.0,
             fps: 57.0,
             lines: 13_680,
-            lost_frames: 0,
             noise_px: 0.01,
-            peaks: Default::default(),
-            warnings: Warnings(warnings),
-            um_per_px: None,
-            velocity_mm_s_rms: None,
+            warnings,
+            ..Report::EMPTY
         }
     }
 

@@ -234,7 +234,7 @@ impl<'a> Lines<'a> {
         let last = self.binner.finish();
         let full = last.is_some_and(|sample| self.collector.push(sample));
         if full {
-            complete(&mut self.collector, Warnings(0));
+            complete(&mut self.collector, Warnings::NONE);
         }
         if self.collector.finish() {
             let warnings = warnings(&self.light, self.tracker.counts(), &mut self.told);
@@ -269,17 +269,11 @@ fn warnings(light: &Light, now: Counts, told: &mut Counts) -> Warnings {
     let no_texture = now.no_texture - told.no_texture;
     let disturbed = now.disturbed - told.disturbed;
     let all = measured + no_texture + disturbed;
-    let mut bits = 0;
-    for (met, warning) in [
-        (disturbed * 100 > all, Warning::Disturbed),
-        (now.relearned > told.relearned, Warning::Relearned),
-        (no_texture * 2 > all, Warning::LittleTexture),
-        (light.is_bad(), Warning::BadLight),
-    ] {
-        if met {
-            bits |= warning as u16;
-        }
-    }
+    let mut warnings = Warnings::NONE;
+    warnings.insert_if(disturbed * 100 > all, Warning::Occluded);
+    warnings.insert_if(now.relearned > told.relearned, Warning::Relearned);
+    warnings.insert_if(no_texture * 2 > all, Warning::LittleTexture);
+    warnings.insert_if(light.is_bad(), Warning::BadLight);
     *told = now;
-    Warnings(bits)
+    warnings
 }

@@ -319,7 +319,7 @@ fn compute(
             Ok(mut reporter) => reporter.report(),
             Err(_) => return,
         };
-        report.warnings.0 |= ready.warnings.0;
+        report.warnings = report.warnings.union(ready.warnings);
         // The core counts from the session's first frame, a board from its own start.
         let first = *first_ms.get_or_insert(report.time_ms);
         report.time_ms = ready.offset_ms + report.time_ms.saturating_sub(first);

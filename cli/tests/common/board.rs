@@ -15,7 +15,7 @@ use std::time::{Duration, Instant};
 use nix::fcntl::{FcntlArg, FdFlag, fcntl};
 use rowtone::link::settings::Wire;
 use rowtone::link::settings::store::Nowhere;
-use rowtone::report::{Peak, Report, Warnings};
+use rowtone::report::{Peak, Report};
 use rowtone::wire::{Message, text};
 use serialport::{SerialPort, TTYPort};
 
@@ -49,14 +49,11 @@ pub(crate) fn report(seq: u32) -> Report {
         window_s: 1.0,
         fps: 60.0,
         lines: 18_000,
-        lost_frames: 0,
         noise_px: 0.0131,
         peaks: [peak(49.2, 1), peak(98.4, 2), peak(147.6, 3)]
             .into_iter()
             .collect(),
-        warnings: Warnings(0),
-        um_per_px: None,
-        velocity_mm_s_rms: None,
+        ..Report::EMPTY
     }
 }
 

@@ -142,7 +142,7 @@ fn metrics(report: &Report, session: u32) -> Vec<Metric> {
         whole("lines", report.lines),
         whole("lost_frames", report.lost_frames.into()),
         real("noise_px".to_owned(), Some(report.noise_px)),
-        whole("warnings", report.warnings.0.into()),
+        whole("warnings", report.warnings.bits()),
         real("um_per_px".to_owned(), report.um_per_px),
         real(
             "velocity_mm_s_rms".to_owned(),

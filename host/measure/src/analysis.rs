@@ -243,18 +243,12 @@ impl<'a> Analysis<'a> {
         }
         let rows = (self.unmeasured.len() * self.shifts.part.height).max(1);
         let share = |unmeasured: u32| f64::from(unmeasured) / rows as f64;
-        for (met, warning) in [
-            (
-                share(unmeasured.disturbed) > DISTURBED_SHARE,
-                Warning::Disturbed,
-            ),
-            (unmeasured.learning > 0, Warning::Relearned),
-            (share(unmeasured.no_texture) > 0.5, Warning::LittleTexture),
-        ] {
-            if met {
-                report.warnings.0 |= warning as u16;
-            }
-        }
+        let warnings = &mut report.warnings;
+        let occluded = share(unmeasured.disturbed) > DISTURBED_SHARE;
+        warnings.insert_if(occluded, Warning::Occluded);
+        warnings.insert_if(unmeasured.learning > 0, Warning::Relearned);
+        let little_texture = share(unmeasured.no_texture) > 0.5;
+        warnings.insert_if(little_texture, Warning::LittleTexture);
         on(Event::Report(&report))
     }
 }

@@ -25,7 +25,7 @@ pub fn example(um_per_px: Option<f32>) -> Report {
         peaks: [peak(49.2003, 0.3998), peak(1500.0, 0.02)]
             .into_iter()
             .collect(),
-        warnings: Warnings(Warning::LostFrames as u16 | Warning::Disturbed as u16),
+        warnings: Warnings::of(Warning::LostFrames).union(Warnings::of(Warning::Occluded)),
         um_per_px,
         velocity_mm_s_rms: None,
     }

@@ -4,7 +4,7 @@ use rowtone::report::{Peak, Report};
 use serde::Serialize;
 
 use super::zone::ZoneLimits;
-use super::{band_velocity, velocity_mm_s_rms, warnings};
+use super::{band_velocity, velocity_mm_s_rms};
 
 #[derive(Serialize)]
 struct ReportObject {
@@ -82,7 +82,7 @@ pub fn zoned(report: &Report, limits: Option<&ZoneLimits>) -> String {
             .iter()
             .map(|peak| PeakObject::new(peak, report.um_per_px))
             .collect(),
-        warnings: warnings(report.warnings).map(|(name, _)| name).collect(),
+        warnings: report.warnings.names().collect(),
     };
     // Numbers, strings and lists of them always serialise; a number that is not finite becomes null.
     serde_json::to_string(&object).unwrap_or_default()
@@ -101,7 +101,7 @@ mod tests {
                 r#""noise_px":0.0131,"peaks":[{"hz":49.2003,"hz_sd":0.0004,"amplitude_px":0.3998,"#,
                 r#""amplitude_px_sd":0.0002,"snr_db":61.2,"ambiguous":false,"track":1},{"hz":1500.0,"#,
                 r#""hz_sd":0.0004,"amplitude_px":0.02,"amplitude_px_sd":0.0002,"snr_db":61.2,"#,
-                r#""ambiguous":false,"track":1}],"warnings":["lost_frames","disturbed"]}"#
+                r#""ambiguous":false,"track":1}],"warnings":["lost_frames","occluded"]}"#
             )
         );
     }

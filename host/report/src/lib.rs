@@ -6,7 +6,7 @@ pub mod json;
 pub mod text;
 pub mod zone;
 
-use rowtone::report::{Report, Warning, Warnings};
+use rowtone::report::{Report, Warning};
 
 pub use example::example;
 
@@ -30,67 +30,40 @@ pub fn band_velocity(report: &Report) -> Option<f64> {
     Some(squares.sqrt())
 }
 
-/// Every warning, its name in JSON, and what it says to a person.
-const WARNINGS: [(Warning, &str, &str); 11] = [
-    (
-        Warning::HiddenNearFrameRate,
-        "hidden_near_frame_rate",
-        "a vibration near a multiple of the frame rate could hide: change the frame rate to look again",
-    ),
-    (Warning::LostFrames, "lost_frames", "frames were lost"),
-    (
-        Warning::ShortWindow,
-        "short_window",
-        "the window is shorter than asked for",
-    ),
-    (
-        Warning::Disturbed,
-        "disturbed",
-        "something passed through the picture: its rows were left out",
-    ),
-    (
-        Warning::Relearned,
-        "relearned",
-        "the scene changed: the reference was learned anew",
-    ),
-    (
-        Warning::LittleTexture,
-        "little_texture",
-        "less than half of the rows have texture to measure",
-    ),
-    (
-        Warning::MoreTones,
-        "more_tones",
-        "there were more tones than the report holds",
-    ),
-    (
-        Warning::BadLight,
-        "bad_light",
-        "the picture is too dark or saturated in most rows",
-    ),
-    (
-        Warning::WatchdogReset,
-        "watchdog_reset",
-        "the board has started anew: its watchdog reset it",
-    ),
-    (
-        Warning::PanicReset,
-        "panic_reset",
-        "the board has started anew: its firmware failed",
-    ),
-    (
-        Warning::CommandReset,
-        "command_reset",
-        "the board has started anew: it was told to",
-    ),
-];
-
-/// The warnings that are set, as (name, sentence).
-pub fn warnings(set: Warnings) -> impl Iterator<Item = (&'static str, &'static str)> {
-    WARNINGS
-        .into_iter()
-        .filter(move |(warning, ..)| set.0 & *warning as u16 != 0)
-        .map(|(_, name, sentence)| (name, sentence))
+/// What a warning says to a person: a sentence without a stop.
+pub const fn sentence(warning: Warning) -> &'static str {
+    match warning {
+        Warning::HiddenNearFrameRate => {
+            "a vibration near a multiple of the frame rate could hide: change the frame rate to look again"
+        }
+        Warning::LostFrames => "frames were lost",
+        Warning::ShortWindow => "the window is shorter than asked for",
+        Warning::Occluded => "something passed through the picture: its rows were left out",
+        Warning::Relearned => "the scene changed: the reference was learned again",
+        Warning::LittleTexture => "less than half of the rows have texture to measure",
+        Warning::MoreTones => "there were more tones than the report holds",
+        Warning::BadLight => "the picture is too dark or saturated in most rows",
+        Warning::WatchdogReset => "the board has started again: its watchdog reset it",
+        Warning::PanicReset => "the board has started again: its firmware failed",
+        Warning::CommandReset => "the board has started again: it was told to",
+        Warning::ThinGroups => {
+            "groups of rows lacked rows that they have as a rule, and were left out"
+        }
+        Warning::DroppedSamples => "samples were dropped: they came late or found no room",
+        Warning::DroppedWindows => {
+            "a window before this one was not computed: the spectrum was busy"
+        }
+        Warning::CameraMoves => "the camera itself moves: give --background, or fix it better",
+        Warning::TimingContradiction => {
+            "the motion contradicts frame rate times line time: one of the two is wrong"
+        }
+        Warning::Compressed => "the pictures were compressed: amplitudes are lower bounds",
+        Warning::RepeatedFrames => "frames came more than once",
+        Warning::ExposureUnknown => "the exposure is unknown: amplitudes are as filmed",
+        Warning::CoarseTimes => {
+            "the frames' times are coarse: frequencies are less sure than they say"
+        }
+    }
 }
 
 #[cfg(test)]
@@ -107,7 +80,14 @@ mod tests {
 
     #[test]
     fn warnings_have_their_names() {
-        let set: Vec<_> = warnings(example(None).warnings).map(|w| w.0).collect();
-        assert_eq!(set, ["lost_frames", "disturbed"]);
+        let set: Vec<_> = example(None).warnings.names().collect();
+        assert_eq!(set, ["lost_frames", "occluded"]);
+    }
+    #[test]
+    fn every_warning_has_a_sentence_of_its_own() {
+        for &warning in &Warning::ALL {
+            let same = |other: &&Warning| sentence(**other) == sentence(warning);
+            assert_eq!(Warning::ALL.iter().filter(same).count(), 1, "{warning:?}");
+        }
     }
 }

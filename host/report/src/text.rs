@@ -5,7 +5,7 @@ use std::fmt::Write;
 use rowtone::report::{Peak, Report};
 
 use super::zone::ZoneLimits;
-use super::{band_velocity, velocity_mm_s_rms, warnings};
+use super::{band_velocity, sentence, velocity_mm_s_rms};
 
 /// A report as a heading and one line a peak, without the last line feed.
 pub fn report(report: &Report) -> String {
@@ -36,7 +36,7 @@ pub fn zoned(report: &Report, limits: Option<&ZoneLimits>) -> String {
     for peak in &report.peaks {
         let _ = write!(text, "\n{}", peak_line(peak, report.um_per_px));
     }
-    for (_, sentence) in warnings(report.warnings) {
+    for sentence in report.warnings.iter().map(sentence) {
         let _ = write!(text, "\n            note: {sentence}");
     }
     text

@@ -2,7 +2,7 @@
 
 use heapless::Vec;
 
-use crate::report::{Peak, Report, Warnings};
+use crate::report::{Peak, Report};
 use crate::wire::CRC_32;
 use crate::wire::message::{SettingsOrigin, Status};
 
@@ -114,7 +114,7 @@ fn report_register(report: &Report, at: u16) -> u16 {
         24 | 25 => real(report.fps),
         26 | 27 => pair(report.lines),
         28 => report.lost_frames,
-        29 => report.warnings.0,
+        29 => report.warnings.lower_bits(),
         30 | 31 => real(report.noise_px),
         32 | 33 => real(report.velocity_mm_s_rms.unwrap_or(0.0)),
         _ => real(report.um_per_px.unwrap_or(0.0)),
@@ -202,7 +202,7 @@ pub fn decode_report(register: impl Fn(u16) -> Option<u16>) -> Option<Report> {
         fps: real(24)?,
         lines: pair(26)?,
         lost_frames: register(28)?,
-        warnings: Warnings(register(29)?),
+        warnings: register(29)?.into(),
         noise_px: real(30)?,
         velocity_mm_s_rms: (flags & 4 != 0).then_some(real(32)?),
         um_per_px: (flags & 2 != 0).then_some(real(34)?),

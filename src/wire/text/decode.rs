@@ -184,7 +184,7 @@ fn read_report(mut fields: Fields<'_>) -> Result<Message, DecodeError> {
 fn read_warnings(field: &str) -> Result<Warnings, DecodeError> {
     hexadecimal(field, 4)
         .and_then(|bits| u16::try_from(bits).ok())
-        .map(Warnings)
+        .map(Warnings::from)
         .ok_or(DecodeError::Field("warnings"))
 }
 

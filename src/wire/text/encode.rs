@@ -56,7 +56,7 @@ fn write_report(session: u32, report: &Report, out: &mut impl Write) -> fmt::Res
     real(out, ',', report.fps, resolution::HZ)?;
     write!(out, ",{},{}", report.lines, report.lost_frames)?;
     real(out, ',', report.noise_px, resolution::PX)?;
-    write!(out, ",{:04X}", report.warnings.0)?;
+    write!(out, ",{:04X}", report.warnings.lower_bits())?;
     optional(out, report.um_per_px, resolution::UM_PER_PX)?;
     optional(out, report.velocity_mm_s_rms, resolution::MM_S)?;
     write!(out, ",{}", report.peaks.len())?;

@@ -9,7 +9,7 @@ use rowtone::report::{Peak, Report};
 
 use super::history::{History, TREND};
 use super::screen::View;
-use rowtone_report::{band_velocity, text::digits, velocity_mm_s_rms, warnings};
+use rowtone_report::{band_velocity, sentence, text::digits, velocity_mm_s_rms};
 
 /// Columns of a peak's numbers, and of what is noted behind its trend.
 const NUMBERS: usize = 37;
@@ -22,7 +22,7 @@ const TIMES: usize = 7;
 pub(super) fn draw(frame: &mut Frame<'_>, view: &View<'_>) {
     let newest = view.history.reports.front();
     let peaks = newest.map_or(0, |report| report.peaks.len());
-    let notes = newest.map_or(0, |report| warnings(report.warnings).count());
+    let notes = newest.map_or(0, |report| report.warnings.iter().count());
     let rows = |count: usize| u16::try_from(count).unwrap_or(u16::MAX);
     let half = frame.area().height / 2;
     let [head, middle, below, foot] = Layout::vertical([
@@ -60,7 +60,8 @@ fn top<'a>(view: &'a View<'_>) -> Vec<Line<'a>> {
         second.push(format!("  {velocity:.3} mm/s RMS").bold());
     }
     let mut lines = vec![Line::from(first), Line::from(second)];
-    lines.extend(warnings(report.warnings).map(|(_, sentence)| Line::from(sentence).yellow()));
+    let warnings = report.warnings.iter();
+    lines.extend(warnings.map(|warning| Line::from(sentence(warning)).yellow()));
     lines
 }
 

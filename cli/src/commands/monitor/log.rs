@@ -129,7 +129,7 @@ fn csv(received_s: f64, session: u32, report: &Report) -> String {
         report.lines,
         report.lost_frames,
         report.noise_px,
-        report.warnings.0,
+        report.warnings.bits(),
         velocity.unwrap_or_default(),
     );
     for number in 0..MAX_PEAKS {
