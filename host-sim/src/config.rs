@@ -4,6 +4,8 @@ mod check;
 
 use serde::Serialize;
 
+use super::defects::Defects;
+use super::field::Mode;
 use super::light::Light;
 use super::motion::{Motion, Step};
 use super::scene::Scene;
@@ -106,6 +108,37 @@ pub struct Faults {
     pub late_probability: f64,
     /// By how much a late frame is late, µs.
     pub late_us: f64,
+    /// Frames, by number, that show the pixels of the frame before them again.
+    pub copies: Vec<u32>,
+    /// What the first frame shows in place of the scene.
+    pub first_frame: Option<FirstFrame>,
+}
+
+/// What a camera delivers before it is ready.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum FirstFrame {
+    /// Zeros.
+    Black,
+    /// Read noise without light.
+    Dark,
+    /// The scene as it once stood, a third of the width away.
+    Stale,
+    /// Random values.
+    Random,
+}
+
+/// A soft shadow that passes over the picture; it takes light and moves nothing.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Shadow {
+    /// When its middle is at the left edge, s.
+    pub start_s: f64,
+    /// How long its middle takes to the right edge, s.
+    pub duration_s: f64,
+    /// Standard deviation of its Gaussian profile, px.
+    pub width_px: f64,
+    /// Light that it takes in its middle, 0 to 1.
+    pub depth: f64,
 }
 
 /// A hand (dark, soft-edged) that passes through the whole height of the picture.
@@ -132,6 +165,8 @@ pub struct Disturbances {
     pub black_rows: Vec<u32>,
     /// A hand passing through.
     pub hand: Option<Hand>,
+    /// A shadow passing over.
+    pub shadow: Option<Shadow>,
     /// The scene becomes a different one of the same kind, s.
     pub scene_change_s: Option<f64>,
     /// Analogue gain from given times on, as a factor.
@@ -155,6 +190,8 @@ pub struct Config {
     pub optics: Optics,
     /// How the object moves.
     pub motion: Motion,
+    /// What moves differently from place to place, and along the columns; added to the motion.
+    pub modes: Vec<Mode>,
     /// How the whole picture moves because the camera does; added to the object's motion.
     pub shake: Motion,
     /// This many columns at the left do not move with the object.
@@ -169,6 +206,8 @@ pub struct Config {
     pub faults: Faults,
     /// What disturbs the picture.
     pub disturbances: Disturbances,
+    /// What is wrong with the sensor.
+    pub defects: Defects,
 }
 
 impl Default for Config {
@@ -194,6 +233,7 @@ impl Default for Config {
                 bright: 0.95,
             },
             motion: Motion::default(),
+            modes: Vec::new(),
             shake: Motion::default(),
             background_cols: 0,
             vibrating: None,
@@ -201,6 +241,7 @@ impl Default for Config {
             rate_changes: Vec::new(),
             faults: Faults::default(),
             disturbances: Disturbances::default(),
+            defects: Defects::default(),
         }
     }
 }

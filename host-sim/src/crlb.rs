@@ -43,28 +43,95 @@ fn row_bound_px(camera: &Camera, row: u32) -> Option<f64> {
 
 /// Fisher information of some columns of a row about its displacement, 1/px².
 pub fn information_per_px2(camera: &Camera, row: u32, cols: Range<u32>) -> f64 {
+    pixels(camera, row, cols)
+        .map(|p| p.right_dn * p.right_dn / p.variance_dn2)
+        .sum()
+}
+
+/// What a pixel tells: how its value changes with the picture's motion, and its noise.
+struct Pixel {
+    /// Change of its value to the right, DN/px.
+    right_dn: f64,
+    /// Change of its value downwards, DN/px.
+    down_dn: f64,
+    /// Variance of its value, DN².
+    variance_dn2: f64,
+}
+
+/// The pixels of a row that are neither white nor dead nor hot.
+fn pixels(camera: &Camera, row: u32, cols: Range<u32>) -> impl Iterator<Item = Pixel> + '_ {
     let config = camera.config();
     let disturbed = &config.disturbances;
-    if disturbed.saturated_rows.contains(&row) || disturbed.black_rows.contains(&row) {
-        return 0.0;
-    }
-    let (y, first) = (row as usize, cols.start);
+    let unlit = disturbed.saturated_rows.contains(&row) || disturbed.black_rows.contains(&row);
+    let cols = if unlit { 0..0 } else { cols };
+    let (y, first) = (camera.texture_row(row), cols.start);
     let cols = cols.start as usize..cols.end as usize;
     let levels = camera.texture().row(y, cols.clone(), 0.0);
-    let slopes = camera.texture().slope(y, cols);
+    let right = camera.texture().slope(y, cols.clone());
+    let down = camera.texture().slope_down(y, cols);
     let white = config.sensor.white_dn();
     let (all, rows) = (config.sensor.cols as usize, config.sensor.rows as usize);
-    let uneven = config.light.at_place(all, y, rows);
-    let mut information = 0.0;
-    for ((level, slope), x) in levels.iter().zip(slopes).zip(first..) {
-        let light = uneven.as_ref().map_or(1.0, |f| f(x as usize));
-        let level = light as f32 * level;
-        if level < 1.0 && !disturbed.dead_cols.contains(&x) {
-            let slope_dn = f64::from(slope) * light * white;
-            information += slope_dn * slope_dn / camera.pixels().variance_dn2(level);
-        }
+    let uneven = config.light.at_place(all, row as usize, rows);
+    let hot: Vec<u32> = camera.pattern().hot(row).collect();
+    let slopes = right.into_iter().zip(down);
+    (first..)
+        .zip(levels.into_iter().zip(slopes))
+        .filter_map(move |(x, (level, (right, down)))| {
+            let light = uneven.as_ref().map_or(1.0, |f| f(x as usize));
+            let level = light as f32 * level;
+            let blind = level >= 1.0 || disturbed.dead_cols.contains(&x) || hot.contains(&x);
+            (!blind).then(|| Pixel {
+                right_dn: f64::from(right) * light * white,
+                down_dn: f64::from(down) * light * white,
+                variance_dn2: camera.pixels().variance_dn2(level),
+            })
+        })
+}
+
+/// Fisher information of some columns of a row about the displacement along both axes, 1/px²: of
+/// u, of v, and what they share (motion on both axes, as in a 2x2 matrix).
+pub fn information_of_both(camera: &Camera, row: u32, cols: Range<u32>) -> [f64; 3] {
+    let mut both = [0.0; 3];
+    for pixel in pixels(camera, row, cols) {
+        let Pixel {
+            right_dn,
+            down_dn,
+            variance_dn2,
+        } = pixel;
+        both[0] += right_dn * right_dn / variance_dn2;
+        both[1] += down_dn * down_dn / variance_dn2;
+        both[2] += right_dn * down_dn / variance_dn2;
     }
-    information
+    both
+}
+
+/// Least standard deviation of u and of v that any estimator of both can reach from one row, px;
+/// `None` for an axis of which the row tells nothing by itself.
+pub fn row_bounds_of_both_px(camera: &Camera, row: u32) -> [Option<f64>; 2] {
+    let Some(cols) = camera.config().moving_cols(row) else {
+        return [None; 2];
+    };
+    let [uu, vv, uv] = information_of_both(camera, row, cols);
+    let left = |own: f64, other: f64| own - if other > 0.0 { uv * uv / other } else { 0.0 };
+    [left(uu, vv), left(vv, uu)]
+        .map(|information| (information > 1e-4).then(|| 1.0 / information.sqrt()))
+}
+
+/// Median over the rows of [`row_bounds_of_both_px`], px; `None` for an axis of which less than half
+/// of the rows tell something.
+pub fn medians_of_both_px(camera: &Camera) -> [Option<f64>; 2] {
+    let rows = camera.config().sensor.rows;
+    let bounds: Vec<_> = (0..rows)
+        .map(|row| row_bounds_of_both_px(camera, row))
+        .collect();
+    [0, 1].map(|axis| {
+        let mut known: Vec<f64> = bounds.iter().map(|b| b[axis].unwrap_or(f64::MAX)).collect();
+        known.sort_by(f64::total_cmp);
+        known
+            .get(known.len() / 2)
+            .copied()
+            .filter(|&px| px < f64::MAX)
+    })
 }
 
 /// The bounds in short; `None` when no row knows anything.

@@ -6,6 +6,7 @@
 //! against closed forms.
 
 use super::config::Config;
+use super::field::{Mode, Wave};
 use super::texture::Kernel;
 
 /// Nodes and weights on -1 to 1 for every number of nodes up to 32.
@@ -119,6 +120,11 @@ impl Seen {
         };
     }
 
+    /// The instants at which it looked last, s, with weights that add up to 1.
+    pub(super) fn instants(&self) -> &[(f64, f64)] {
+        &self.instants
+    }
+
     /// Instants of the exposure with weights that add up to 1.
     fn choose_instants(
         &mut self,
@@ -137,6 +143,11 @@ impl Seen {
         config.motion.jumps(from_s, to_s, &mut self.jumps);
         config.shake.jumps(from_s, to_s, &mut self.jumps);
         config.light.jumps(from_s, to_s, &mut self.jumps);
+        let hits = config.modes.iter().filter_map(|mode| match mode.wave {
+            Wave::Hit { start_s, .. } => Some(start_s),
+            _ => None,
+        });
+        self.jumps.extend(hits.filter(|&t| t > from_s && t < to_s));
         self.jumps.extend(
             config
                 .disturbances
@@ -150,10 +161,18 @@ impl Seen {
             .highest_hz()
             .max(config.shake.highest_hz())
             .max(config.light.highest_hz());
+        let modes = config.modes.iter().map(Mode::highest_hz);
+        let fastest_hz = modes.fold(fastest_hz, f64::max);
         let mut start = from_s;
         for &end in &self.jumps {
             let length = end - start;
-            let travel = config.motion.travel_px(length) + config.shake.travel_px(length);
+            let travel = config.motion.travel_px(length)
+                + config.shake.travel_px(length)
+                + config
+                    .modes
+                    .iter()
+                    .map(|m| m.travel_px(length))
+                    .sum::<f64>();
             let nodes =
                 4 + (4.0 * fastest_hz * length).ceil() as usize + (4.0 * travel).ceil() as usize;
             quadrature.instants(start, end, nodes, &mut self.instants);

@@ -11,8 +11,8 @@
 //! 1. [`scene`]: how much light each point of the object reflects, as a periodic strip;
 //! 2. [`texture`]: blurred by lens and pixel area, kept eight times finer than the pixels;
 //! 3. [`exposure`]: integrated over the row's own exposure interval while the object moves
-//!    ([`motion`]) and the light changes ([`light`]);
-//! 4. [`noise`]: shot noise, read noise, quantisation, saturation.
+//!    ([`motion`], and not everywhere alike: [`Mode`]) and the light changes ([`light`]);
+//! 4. the sensor's [`Defects`]; [`noise`]: shot noise, read noise, quantisation, saturation.
 //!
 //! [`schedule`] says when each frame starts, which are lost and which come late; [`crlb`] how well
 //! any estimator could know the displacement of a row; [`truth`] writes it all down.
@@ -36,24 +36,32 @@
 pub mod camera;
 pub mod config;
 pub mod crlb;
+mod defects;
 mod error;
 pub mod exposure;
+mod field;
 mod frame;
 pub mod light;
 pub mod motion;
 pub mod noise;
 pub mod parallel;
+mod plane;
 pub mod preset;
 pub mod scene;
 pub mod schedule;
 mod sound;
+mod startup;
 pub mod texture;
 pub mod truth;
 pub mod y4m;
 
 pub use camera::{Camera, RowTruth};
-pub use config::{Config, Disturbances, Faults, Hand, Optics, RateChange, Rect, Sensor};
+pub use config::{
+    Config, Disturbances, Faults, FirstFrame, Hand, Optics, RateChange, Rect, Sensor, Shadow,
+};
+pub use defects::Defects;
 pub use error::SimError;
+pub use field::{Mode, Shape, Term, Wave};
 pub use frame::{Frame, PixelBuffer};
 pub use light::{Flicker, Led, Light};
 pub use motion::{Chirp, Motion, Step, Tone};

@@ -8,6 +8,7 @@ use std::path::PathBuf;
 use serde::Serialize;
 
 use super::error::{SimError, check};
+use super::schedule::{stream, unit};
 use super::texture::Strip;
 use fields::{blur_cols, blur_rows, noise, one_over_f};
 use picture::picture;
@@ -31,6 +32,12 @@ pub enum Scene {
     Stripes {
         /// From one to the next, px.
         period_px: f64,
+    },
+    /// Straight edges at random distances that all lean the same way: only the motion across them
+    /// can be seen.
+    Edges {
+        /// By how much they lean from upright, degrees, -80 to 80.
+        lean_deg: f64,
     },
     /// Like a photograph: detail at every size (amplitude falling as 1/frequency), dark and bright
     /// shapes, and a sky without texture above.
@@ -64,6 +71,12 @@ impl Scene {
                 "the stripes' period (px)",
                 period_px,
                 "2 or more",
+            ),
+            Self::Edges { lean_deg } => check(
+                (-80.0..=80.0).contains(&lean_deg),
+                "the edges' lean (degrees)",
+                lean_deg,
+                "-80 to 80",
             ),
             Self::Photo { sky } => check(
                 (0.0..=1.0).contains(&sky),
@@ -105,6 +118,9 @@ impl Scene {
                         .map(|k| [(k as f64 + 0.25) * step, (k as f64 + 0.75) * step])
                         .collect()
                 })
+            }
+            Self::Edges { lean_deg } => {
+                blurred_down(edges(period_px, rows, *lean_deg, seed), blur_px)
             }
             Self::Photo { sky } => blurred_down(photo(period_px, rows, *sky, seed), blur_px),
             Self::Plain => Strip {
@@ -156,6 +172,30 @@ fn boxes(period_px: usize, rows: usize, in_row: impl Fn(usize) -> Vec<[f64; 2]>)
     }
 }
 
+/// Boxes of random widths, moved to the right from row to row.
+fn edges(period_px: usize, rows: usize, lean_deg: f64, seed: u64) -> Strip {
+    let mut rng = stream(seed, 9, 0);
+    let period = period_px as f64;
+    let (mut ends, mut at) = (Vec::new(), 0.0);
+    while at < period - 30.0 {
+        let start = at + 4.0 + 12.0 * unit(&mut rng);
+        at = start + 4.0 + 12.0 * unit(&mut rng);
+        ends.push([start, at]);
+    }
+    let lean = libm::tan(lean_deg.to_radians());
+    boxes(period_px, rows, |y| {
+        let by = lean * y as f64;
+        let moved = |[start, end]: [f64; 2]| {
+            let start_here = (start + by).rem_euclid(period);
+            [start_here, start_here + end - start]
+        };
+        // What reaches over the strip's end goes on at its beginning.
+        let here = ends.iter().map(|&b| moved(b));
+        here.flat_map(|[a, b]| [[a, b], [a - period, b - period]])
+            .collect()
+    })
+}
+
 /// The lens blurs down the columns too; along the rows the texture does it.
 fn blurred_down(mut strip: Strip, blur_px: f64) -> Strip {
     let width = strip.period_px * strip.fineness;
@@ -199,6 +239,7 @@ mod tests {
             Scene::Stripes { period_px: 14.3 },
             Scene::Photo { sky: 0.25 },
             Scene::Photo { sky: 0.0 },
+            Scene::Edges { lean_deg: 30.0 },
             Scene::Plain,
         ];
         for scene in scenes {

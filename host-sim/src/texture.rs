@@ -83,6 +83,14 @@ impl Texture {
         self.period_px
     }
 
+    /// The value `fine` steps of 1/[`FINENESS`] px to the right of a row's beginning.
+    pub(super) fn fine_value(&self, row: usize, fine: i64) -> f32 {
+        let p = self.period_px;
+        let phase = fine.rem_euclid(FINENESS as i64) as usize;
+        let at = fine.div_euclid(FINENESS as i64).rem_euclid(p as i64) as usize;
+        self.table[(row * FINENESS + phase) * p + at]
+    }
+
     /// Adds to `out` what the pixels `cols` of `row` read through `kernel`.
     pub fn add(&self, row: usize, cols: Range<usize>, kernel: &Kernel, out: &mut [f32]) {
         let p = self.period_px;
@@ -235,7 +243,7 @@ impl Kernel {
 }
 
 /// Weights of the values at -2 to 3 for the point `x`, 0 to 1.
-fn lagrange6(x: f64) -> [f64; 6] {
+pub(super) fn lagrange6(x: f64) -> [f64; 6] {
     let (a, b, c, d, e, f) = (x + 2.0, x + 1.0, x, x - 1.0, x - 2.0, x - 3.0);
     [
         -b * c * d * e * f / 120.0,

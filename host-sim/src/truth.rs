@@ -5,6 +5,7 @@ use serde::Serialize;
 use super::camera::Camera;
 use super::config::Config;
 use super::crlb::{self, CrlbStats};
+use super::field::Mode;
 use super::motion::Tone;
 
 /// The truth about a recording. The first fields are the ones a reader wants; `config` is all.
@@ -34,6 +35,8 @@ pub struct Truth {
     pub blank_share: f64,
     /// The object's tones, amplitudes before the exposure averages them.
     pub tones: Vec<Tone>,
+    /// What moves differently from place to place; amplitudes before the exposure averages them.
+    pub modes: Vec<Mode>,
     /// The camera's own tones.
     pub camera_shake: Vec<Tone>,
     /// Median over the rows of the Cramér–Rao bound of one row's displacement, px; absent when no
@@ -41,6 +44,9 @@ pub struct Truth {
     pub crlb_px_median: Option<f64>,
     /// More about the bound.
     pub crlb: Option<CrlbStats>,
+    /// The same median where both axes are unknown, along x and along y, px; absent where less than
+    /// half of the rows know an axis.
+    pub crlb_px_median_of_both: [Option<f64>; 2],
     /// Depth of the lamp's flicker, 0 when steady.
     pub flicker: f64,
     /// Frequency of the flicker, Hz, 0 when steady.
@@ -75,9 +81,11 @@ impl Truth {
             seconds: span as f64 * 1e-9 + s.readout_s() + f64::from(s.exposure_ns) * 1e-9,
             blank_share: 1.0 - s.readout_s() * s.fps,
             tones: config.motion.tones.clone(),
+            modes: config.modes.clone(),
             camera_shake: config.shake.tones.clone(),
             crlb_px_median: bounds.map(|b| b.median_px),
             crlb: bounds,
+            crlb_px_median_of_both: crlb::medians_of_both_px(camera),
             flicker: config.light.flicker.map_or(0.0, |f| f.depth),
             flicker_hz: config.light.flicker.map_or(0.0, |f| f.hz),
             pts: None,

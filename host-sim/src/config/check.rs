@@ -1,6 +1,6 @@
 //! What a configuration may be.
 
-use super::Config;
+use super::{Config, Shadow};
 use crate::error::{SimError, check};
 use crate::motion::check_steps;
 
@@ -38,6 +38,8 @@ impl Config {
         )?;
         self.scene.check()?;
         self.motion.check()?;
+        self.modes.iter().try_for_each(crate::Mode::check)?;
+        self.defects.check()?;
         self.shake.check()?;
         self.light.check()?;
         self.check_places()?;
@@ -77,6 +79,9 @@ impl Config {
         }
         check_steps(&d.gain_steps)?;
         check_steps(&d.exposure_steps)?;
+        if let Some(s) = d.shadow {
+            check_shadow(&s)?;
+        }
         if let Some(h) = d.hand {
             check(
                 h.start_s.is_finite(),
@@ -192,15 +197,17 @@ impl Config {
         if self.background_cols >= cols {
             return outside("the background columns", self.background_cols.to_string());
         }
-        if let Some(r) = self.vibrating {
+        let vibrating = self.vibrating.map(|r| ("the vibrating part", r));
+        let parts = self.modes.iter().filter_map(|mode| mode.part);
+        for (field, r) in vibrating
+            .into_iter()
+            .chain(parts.map(|r| ("a mode's part", r)))
+        {
             let fits = |at: u32, len: u32, all: u32| {
                 len > 0 && at.checked_add(len).is_some_and(|end| end <= all)
             };
             if !fits(r.x, r.w, cols) || !fits(r.y, r.h, rows) {
-                return outside(
-                    "the vibrating part",
-                    format!("{},{},{},{}", r.x, r.y, r.w, r.h),
-                );
+                return outside(field, format!("{},{},{},{}", r.x, r.y, r.w, r.h));
             }
         }
         let d = &self.disturbances;
@@ -217,6 +224,27 @@ impl Config {
         }
         Ok(())
     }
+}
+
+fn check_shadow(s: &Shadow) -> Result<(), SimError> {
+    check(
+        s.start_s.is_finite(),
+        "the shadow's start (s)",
+        s.start_s,
+        "a number",
+    )?;
+    for (field, value) in [
+        ("the shadow's duration (s)", s.duration_s),
+        ("the shadow's width (px)", s.width_px),
+    ] {
+        check(value > 0.0 && value < 1e5, field, value, "above 0")?;
+    }
+    check(
+        (0.0..=1.0).contains(&s.depth),
+        "the shadow's depth",
+        s.depth,
+        "0 to 1",
+    )
 }
 
 #[cfg(test)]
