@@ -1,6 +1,7 @@
 //! `rowtone simulate`: a recording of a machine that vibrates as asked, with the truth beside it.
 
 mod forms;
+mod modes;
 mod options;
 
 use std::fs::File;

@@ -5,7 +5,10 @@ mod config;
 use std::path::PathBuf;
 
 use super::forms::{self, Gradient, Span};
-use host_sim::{Chirp, Flicker, Hand, Led, Preset, RateChange, Rect, Step, Tone};
+use super::modes;
+use host_sim::{
+    Chirp, FirstFrame, Flicker, Hand, Led, Mode, Preset, RateChange, Rect, Shadow, Step, Tone,
+};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -95,7 +98,7 @@ struct CameraOptions {
 #[derive(Clone, Debug, clap::Args)]
 #[command(next_help_heading = "Scene")]
 struct SceneOptions {
-    /// speckle, bar, stripes, photo, plain, or a picture file (PNG or JPEG)
+    /// speckle, bar, stripes, edges, photo, plain, or a picture file (PNG or JPEG)
     #[arg(long, value_name = "SCENE", default_value = "speckle")]
     scene: String,
     /// Size of the specks (standard deviation), px
@@ -107,6 +110,14 @@ struct SceneOptions {
     /// From one stripe to the next, px
     #[arg(long, value_name = "PX", default_value = "24")]
     stripe_px: f64,
+    /// By how much the edges lean from upright, degrees
+    #[arg(
+        long,
+        value_name = "DEG",
+        default_value = "30",
+        allow_hyphen_values = true
+    )]
+    lean: f64,
     /// Share of the photo's rows that are sky
     #[arg(long, value_name = "SHARE", default_value = "0.25")]
     sky: f64,
@@ -125,7 +136,7 @@ struct SceneOptions {
 }
 
 #[derive(Clone, Debug, clap::Args)]
-#[command(next_help_heading = "Motion (sideways; everything adds up)")]
+#[command(next_help_heading = "Motion (everything adds up)")]
 struct MotionOptions {
     /// A vibration: frequency, zero-to-peak amplitude, phase of the sine (may be repeated)
     #[arg(long, value_name = "HZ:PX[:RAD]", value_parser = forms::tone)]
@@ -153,6 +164,17 @@ struct MotionOptions {
     /// The camera's own vibration, which moves the whole picture (may be repeated)
     #[arg(long, value_name = "HZ:PX[:RAD]", value_parser = forms::tone)]
     shake: Vec<Tone>,
+    /// A vibration that differs from place to place, along both axes: frequency, amplitude along the
+    /// rows, along the columns, phase of that. Amplitudes are polynomials of c (column, -1 left to
+    /// 1 right) and r (row, -1 top to 1 bottom), such as 83.3:0.3r or 97:-0.15r:0.2c (may be repeated)
+    #[arg(long, value_name = "HZ:X[:Y[:RAD]][@X,Y,W,H]", value_parser = modes::mode)]
+    mode: Vec<Mode>,
+    /// A hit that dies away: frequency, start, time to 1/e, amplitudes as of --mode (may be repeated)
+    #[arg(long, value_name = "HZ:START:DECAY:X[:Y[:RAD]]", value_parser = modes::hit)]
+    hit: Vec<Mode>,
+    /// Random vibration of an even spectrum, px rms, places as of --mode (may be repeated)
+    #[arg(long, value_name = "LOW:HIGH:X[:Y]", value_parser = modes::random)]
+    random: Vec<Mode>,
     /// Columns at the left that show an unmoving background
     #[arg(long, value_name = "N", default_value = "0")]
     background_cols: u32,
@@ -215,6 +237,33 @@ struct FaultOptions {
     /// A hand passes through the picture
     #[arg(long, value_name = "START:S:WIDTH[:LEVEL]", value_parser = forms::hand)]
     hand: Option<Hand>,
+    /// A soft shadow passes over the picture: start, time from edge to edge, width, light taken
+    #[arg(long, value_name = "START:S:WIDTH:DEPTH", value_parser = modes::shadow)]
+    shadow: Option<Shadow>,
+    /// Frames that repeat the frame before them
+    #[arg(long, value_name = "N,N-N", value_parser = forms::span, value_delimiter = ',')]
+    copies: Vec<Span>,
+    /// What the first frame shows: black, dark, stale or random
+    #[arg(long, value_name = "WHAT", value_parser = modes::first_frame)]
+    first_frame: Option<FirstFrame>,
+    /// Pixels at random places that always read white
+    #[arg(long, value_name = "N", default_value = "0")]
+    hot_pixels: u32,
+    /// Specks of dust at random places, and the light that each takes in its middle
+    #[arg(long, value_name = "N[:DEPTH]", value_parser = modes::dust)]
+    dust: Option<(u32, f64)>,
+    /// Unequal response of the pixels, rms, as a share
+    #[arg(long, value_name = "SHARE", default_value = "0")]
+    prnu: f64,
+    /// Fixed pattern of the columns, rms, as a share of white
+    #[arg(long, value_name = "SHARE", default_value = "0")]
+    column_pattern: f64,
+    /// Noise that a row's pixels have in common, rms, as a share of white
+    #[arg(long, value_name = "SHARE", default_value = "0")]
+    row_noise: f64,
+    /// Share of the frame before that a phone's temporal denoiser mixes in
+    #[arg(long, value_name = "SHARE", default_value = "0")]
+    denoise: f64,
     /// Another scene of the same kind from this time on, s
     #[arg(long, value_name = "S")]
     scene_change: Option<f64>,

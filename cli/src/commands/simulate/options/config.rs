@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::{Args, CameraOptions, SceneOptions};
 use crate::commands::simulate::forms;
-use host_sim::{Config, Led, Optics, Preset, Scene, Sensor, Sound};
+use host_sim::{Config, Defects, Led, Optics, Preset, Scene, Sensor, Sound};
 use rowtone_calibrate::file::RollingName;
 use rowtone_failure::Failure;
 
@@ -38,6 +38,14 @@ impl Args {
             config.motion.sound = Some(sound);
         }
         config.shake.tones.clone_from(&m.shake);
+        config.modes = [&m.mode, &m.hit, &m.random]
+            .into_iter()
+            .flatten()
+            .cloned()
+            .collect();
+        for (mode, seed) in config.modes.iter_mut().zip(self.seed..) {
+            mode.number(seed);
+        }
         config.background_cols = m.background_cols;
         config.vibrating = m.vibrating;
         config.light.flicker = self.light.flicker;
@@ -75,12 +83,25 @@ impl Args {
         config.faults.lost_probability = f.loss;
         config.faults.jitter_us = f.jitter_us;
         (config.faults.late_probability, config.faults.late_us) = f.late.unwrap_or_default();
+        config.faults.copies = forms::all(&f.copies);
+        config.faults.first_frame = f.first_frame;
+        let (dust_specks, dust_depth) = f.dust.unwrap_or_default();
+        config.defects = Defects {
+            hot_pixels: f.hot_pixels,
+            dust_specks,
+            dust_depth,
+            prnu: f.prnu,
+            column_pattern: f.column_pattern,
+            row_noise: f.row_noise,
+            denoise: f.denoise,
+        };
         let d = &mut config.disturbances;
         d.dead_cols = forms::all(&f.dead_cols);
         d.saturated_rows = forms::all(&f.saturated_rows);
         d.black_rows = forms::all(&f.black_rows);
         d.hand = f.hand;
         d.scene_change_s = f.scene_change;
+        d.shadow = f.shadow;
         d.gain_steps.clone_from(&self.light.gain_step);
         d.exposure_steps.clone_from(&self.light.exposure_step);
     }
@@ -166,6 +187,9 @@ impl SceneOptions {
             },
             "stripes" => Scene::Stripes {
                 period_px: self.stripe_px,
+            },
+            "edges" => Scene::Edges {
+                lean_deg: self.lean,
             },
             "photo" => Scene::Photo { sky: self.sky },
             "plain" => Scene::Plain,
