@@ -175,7 +175,7 @@ fn nothing_is_allocated_from_lines_to_bytes() {
         assert_eq!(calls, 0, "{kernel:?}");
         // The chain did go through all of its states.
         assert!(counts.learning > 0 && counts.measured > 1000, "{counts:?}");
-        assert!(counts.disturbed > 0, "{counts:?}");
+        assert!(counts.occluded > 0, "{counts:?}");
         assert!(counts.relearned >= 1, "{counts:?}");
         assert!(reports >= 3 && bytes > 100, "{reports} {bytes}");
     }

@@ -23,11 +23,11 @@ pub struct Config {
     pub level: Option<Level>,
     /// How far a lost picture is searched for, px either way; at most a third of the width counts.
     pub search_px: u16,
-    /// Columns of coefficients that are built anew in one line time: what a line may cost beside its own
+    /// Columns of coefficients that are built again in one line time: what a line may cost besides its own
     /// measurement. `u16::MAX`: as much as it likes. With fewer, all that a line may need while measuring (not
     /// while learning) is bounded: a row's
     /// reference grows over many lines, a lost picture is searched for at one place a line, and a line that
-    /// would need more is called disturbed. And the light is told by every second column
+    /// would need more is called occluded. And the light is told by every second column
     /// ([`Kernel::with_half_the_light`]).
     pub columns_per_line: u16,
     /// Which implementation of the inner product.

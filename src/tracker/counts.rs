@@ -1,6 +1,6 @@
-//! Every line is counted, whatever became of it.
+//! Every line is counted, whatever its outcome.
 
-/// What became of the lines since the tracker was made. (64 bits do not run out.)
+/// The lines' outcomes since the tracker was made. (64 bits do not run out.)
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
     /// Measured.
@@ -10,9 +10,9 @@ pub struct Counts {
     /// Without enough texture.
     pub no_texture: u64,
     /// Unlike their reference.
-    pub disturbed: u64,
+    pub occluded: u64,
     /// Of another width, or of a row that is not there.
     pub misfit: u64,
-    /// How often the scene changed and the reference was learned anew.
+    /// How often the scene changed and the reference was learned again.
     pub relearned: u32,
 }

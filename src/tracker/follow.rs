@@ -1,8 +1,8 @@
 //! The reference follows the picture, slowly: light and focus change, and things creep.
 //!
-//! None of it is done in one line time: a row in its turn is averaged, and its coefficients are built anew,
-//! some columns beside each line, while the old coefficients still serve; a whole reference is moved one
-//! row after the other, some columns beside each line.
+//! None of it is done in one line time: a row in its turn is averaged, and its coefficients are built again,
+//! some columns in the background of each line, while the old coefficients still serve; a whole reference is moved one
+//! row after the other, some columns in the background of each line.
 
 use super::{RowLearning, Stage, Tracker};
 use crate::{
@@ -40,7 +40,7 @@ enum Work {
         averaging: Averaging,
         column: usize,
     },
-    /// The row's coefficients are built anew.
+    /// The row's coefficients are built again.
     Build { row: usize, build: Build },
     /// They are there, with their table, and become what the kernel keeps; the next column.
     Keep {
@@ -79,7 +79,7 @@ impl Moving {
     };
 }
 
-/// One row in so many frames takes a little of the picture: building its coefficients anew is what costs. All
+/// One row in so many frames takes a little of the picture: building its coefficients again is what costs. All
 /// 240 rows at 60 fps have had their turn in a minute, and the reference forgets over a quarter of an hour; where a line
 /// time is short, in twice as long.
 const FRAMES_A_ROW: u32 = 16;
@@ -114,10 +114,10 @@ impl Follow {
 /// Columns at either end of a row that have no coefficients, whatever its band; what is moved further in comes in as 0.
 const ENDS: usize = 4;
 
-/// A column is laid elsewhere, or kept, so many times faster than it is built anew.
+/// A column is laid elsewhere, or kept, so many times faster than it is built again.
 const LAID: usize = 4;
 
-/// Columns of a mean that are moved beside a line.
+/// Columns of a mean that are moved in the background of a line.
 const MEAN_COLUMNS: usize = 48;
 
 /// Frames over which the drift is averaged.
@@ -142,7 +142,7 @@ impl Tracker<'_> {
         (frame / frames).wrapping_mul(619) as usize % usize::from(self.config.rows)
     }
 
-    /// The reference of a row that was looked at and fitted is to take a little of it.
+    /// The reference of a row that was checked and fitted is to take a little of it.
     pub(super) fn follow_row<P: Pixel>(&mut self, row: usize, pixels: &[P], shift_px: f32) {
         if self.follow.is_busy() {
             return;
@@ -253,9 +253,9 @@ impl Tracker<'_> {
         0.0
     }
 
-    /// Moves some columns of a row, beside the line of row `beside`; a whole one where a line may take what it likes.
+    /// Moves some columns of a row, in the background of the line of row `during`; a whole one where a line may take what it likes.
     #[inline(never)]
-    fn move_one_step(&mut self, beside: usize, columns: usize) {
+    fn move_one_step(&mut self, during: usize, columns: usize) {
         let Work::Move {
             by_px,
             next,
@@ -319,7 +319,7 @@ impl Tracker<'_> {
                     let steps = width.div_ceil(MEAN_COLUMNS);
                     // It is to be done before its own line comes.
                     let rows = usize::from(self.config.rows);
-                    let ahead = (*next + rows).saturating_sub(beside) % rows;
+                    let ahead = (*next + rows).saturating_sub(during) % rows;
                     if *moved == 0 && ahead <= steps + 2 && rows > 2 * steps {
                         return;
                     }

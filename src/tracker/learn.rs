@@ -1,7 +1,7 @@
 //! Learning the reference, in two rounds of frames.
 
 use super::correlate::{NEAR_PX, NEAR_WHILE_LEARNING_PX};
-use super::{Left, Place, Stage, Tracker, follow::Follow, predict::Prediction, watch::Watch};
+use super::{Place, Rejected, Stage, Tracker, check::Check, follow::Follow, predict::Prediction};
 use crate::{
     camera::pixel::Pixel,
     reference::NoiseMeter,
@@ -88,12 +88,12 @@ const NOISE_ROWS: usize = 4;
 const SMALL_MOTION_PX: f32 = 0.6;
 
 impl Tracker<'_> {
-    /// Forgets the reference and learns it anew from the next line on. Counters go on.
+    /// Forgets the reference and learns it again from the next line on. Counters go on.
     pub fn relearn(&mut self) {
         let values = 32768.0 / self.recipe.counts_per_value;
         self.stage = Stage::Rough;
         self.frame = None;
-        self.quiet.end();
+        self.fast_path.end();
         self.frames_in_stage = 0;
         self.range_px = 0.0;
         self.to_reference = 1.0;
@@ -105,7 +105,7 @@ impl Tracker<'_> {
         #[cfg(feature = "long-exposure")]
         self.paths.relearn();
         self.meter = NoiseMeter::default();
-        self.watch = Watch::default();
+        self.check = Check::default();
         self.follow = Follow::default();
         self.recipe.noise = PixelNoise::guess(values);
         self.recipe.level = self.config.level.unwrap_or(Level::Medium);
@@ -167,14 +167,19 @@ impl Tracker<'_> {
         self.range_px = 0.0;
         self.frames_in_stage = 0;
         self.frame = None;
-        self.quiet.end();
+        self.fast_path.end();
     }
 
     /// Aligns a line and averages it into its reference.
     ///
     /// `found`: its own shift. In the first frame nothing is known, so no row has texture: it is not moved.
     #[cold]
-    pub(super) fn learn<P: Pixel>(&mut self, row: usize, pixels: &[P], found: Result<Place, Left>) {
+    pub(super) fn learn<P: Pixel>(
+        &mut self,
+        row: usize,
+        pixels: &[P],
+        found: Result<Place, Rejected>,
+    ) {
         let mut textured = false;
         let shift_px = match found {
             Ok(Place {
@@ -189,7 +194,7 @@ impl Tracker<'_> {
                 }
                 shift_px
             }
-            Ok(_) | Err(Left::NoTexture) => self.prediction.at(row),
+            Ok(_) | Err(Rejected::NoTexture) => self.prediction.at(row),
             Err(_) => return,
         };
         let Some(&seen) = self.storage.learning.get(row) else {
@@ -324,7 +329,7 @@ impl Tracker<'_> {
     }
 
     /// Moves each row's reference to the middle of its motion: the first frame, to which it is anchored,
-    /// may have met the picture anywhere, and elsewhere in the row beside.
+    /// may have met the picture anywhere, and elsewhere in the next row.
     fn centre_rows(&mut self) {
         let width = usize::from(self.config.width);
         let rows = self.storage.mean.chunks_exact_mut(width);

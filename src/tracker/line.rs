@@ -1,8 +1,8 @@
-//! What becomes of a line.
+//! The sequence that a line goes through.
 //!
-//! Most lines are taken in a straight line: the picture has moved little, nothing is looked at and nothing else
-//! is to be done ([`Tracker::take_quietly`]). All that decides it is settled by the line before, as a row up to
-//! which lines are quiet. Whatever is not so, or turns out not to be, is taken with care.
+//! Most lines take the fast path: the picture has moved little, nothing is checked and there is no background
+//! job ([`Tracker::take_fast`]). The line before settles which lines those are, as the row up to which the fast
+//! path goes. Any other line, and one that turns out to be unlike them, takes the slow path.
 
 use super::{
     Stage, Tracker,
@@ -19,12 +19,12 @@ use crate::{
     timeline::{Binner, Sample},
 };
 
-/// A line that was looked at and is further than this from where it was expected has jumped, px.
+/// A line that was checked and is further than this from where it was expected has jumped, px.
 const JUMP_PX: f32 = 1.0;
 
-/// Inner products of a line that is read at another whole pixel, beside which nothing else can be done where a line time is short; a look takes as
-/// long.
-const MUCH: u8 = 2;
+/// A check takes as long as this many inner products of a line that is read at another whole pixel. A line that took so many
+/// has no time for a background job where a line time is short.
+const PRODUCTS_OF_A_CHECK: u8 = 2;
 
 /// Where a line is against the reference, and what it knows of that.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,7 +34,7 @@ pub(super) struct Place {
     pub(super) information_per_px2: f32,
 }
 
-/// A quiet line.
+/// A line on the fast path.
 #[derive(Clone, Copy, Debug)]
 struct Measured {
     shift_px: f32,
@@ -45,29 +45,29 @@ struct Measured {
     information_per_px2: f32,
 }
 
-/// Why a line has none.
+/// Why a line was not measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Left {
+pub(super) enum Rejected {
     Learning,
     NoTexture,
-    Disturbed,
+    Occluded,
     Misfit,
 }
 
-/// Which lines are taken in a straight line: rows of this frame below this one.
+/// Which lines take the fast path: rows of this frame below this one.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Quiet {
+pub(super) struct FastPath {
     frame: u32,
     until_row: u16,
-    /// Those below this one would be, but that they are looked at or that something is done beside them.
-    calm_until_row: u16,
+    /// Rows below this one would, but for a check or a background job.
+    background_until_row: u16,
 }
 
-impl Quiet {
-    /// None.
+impl FastPath {
+    /// No line takes it.
     pub(super) fn end(&mut self) {
         self.until_row = 0;
-        self.calm_until_row = 0;
+        self.background_until_row = 0;
     }
 }
 
@@ -77,8 +77,8 @@ pub(super) type Sums = Option<(f32, f32)>;
 impl Tracker<'_> {
     /// Takes one line, whatever comes of it.
     #[inline(always)]
-    pub(super) fn take<R: Row>(&mut self, line: &Line<'_>, pixels: R) -> Result<Place, Left> {
-        match self.take_quietly(line, &pixels, true) {
+    pub(super) fn take<R: Row>(&mut self, line: &Line<'_>, pixels: R) -> Result<Place, Rejected> {
+        match self.take_fast(line, &pixels, true) {
             Ok(place) => Ok(place),
             Err(sums) => self.take_otherwise(line, pixels, sums),
         }
@@ -91,8 +91,8 @@ impl Tracker<'_> {
         &mut self,
         line: &Line<'_>,
         upper: &UpperBytes<'_>,
-    ) -> Result<Place, Left> {
-        match self.take_quietly(line, upper, true) {
+    ) -> Result<Place, Rejected> {
+        match self.take_fast(line, upper, true) {
             Ok(place) => Ok(place),
             Err(sums) => self.take_scattered_otherwise(line, upper, sums),
         }
@@ -104,7 +104,7 @@ impl Tracker<'_> {
         line: &Line<'_>,
         upper: &UpperBytes<'_>,
         sums: Sums,
-    ) -> Result<Place, Left> {
+    ) -> Result<Place, Rejected> {
         let room = core::mem::take(&mut self.room);
         let place = match Scattered::new(*upper, self.config.kernel, &mut *room) {
             Some(row) => self.take_otherwise(line, row, sums),
@@ -134,17 +134,17 @@ impl Tracker<'_> {
         sample
     }
 
-    /// Takes a line that was not quiet; apart from those that are, so that what they come to stays in registers.
+    /// Takes a line that was not on the fast path; apart from those that are, so that their outcome stays in registers.
     #[inline(never)]
     fn take_otherwise<R: Row>(
         &mut self,
         line: &Line<'_>,
         mut pixels: R,
         sums: Sums,
-    ) -> Result<Place, Left> {
-        match self.take_calmly(line, &mut pixels, sums, true) {
+    ) -> Result<Place, Rejected> {
+        match self.take_with_background(line, &mut pixels, sums, true) {
             Ok(place) => Ok(place),
-            Err(sums) => self.take_with_care(line, pixels, sums),
+            Err(sums) => self.take_slow(line, pixels, sums),
         }
     }
 
@@ -157,9 +157,9 @@ impl Tracker<'_> {
         sums: Sums,
         binner: &mut Binner,
     ) -> Option<Sample> {
-        let place = match self.take_calmly(line, &mut pixels, sums, false) {
+        let place = match self.take_with_background(line, &mut pixels, sums, false) {
             Ok(place) => place,
-            Err(sums) => self.take_with_care(line, pixels, sums).ok()?,
+            Err(sums) => self.take_slow(line, pixels, sums).ok()?,
         };
         self.pass_on(line, place, self.curvature(), binner)
     }
@@ -167,25 +167,25 @@ impl Tracker<'_> {
     /// What every line takes. Nothing has changed where it is refused. `times`: how late it was exposed is asked
     /// afterwards.
     #[inline(always)]
-    pub(super) fn take_quietly<R: Summed>(
+    pub(super) fn take_fast<R: Summed>(
         &mut self,
         line: &Line<'_>,
         pixels: &R,
         times: bool,
     ) -> Result<Place, Sums> {
-        let quiet = line.row < self.quiet.until_row
-            && line.frame == self.quiet.frame
+        let is_fast = line.row < self.fast_path.until_row
+            && line.frame == self.fast_path.frame
             && pixels.len() == usize::from(self.config.width);
-        if !quiet {
+        if !is_fast {
             return Err(None);
         }
-        let quiet = self.measure_quietly(usize::from(line.row), pixels)?;
-        Ok(self.accept(quiet, times))
+        let measured = self.measure_fast(usize::from(line.row), pixels)?;
+        Ok(self.accept(measured, times))
     }
 
     /// What a line comes to where the picture has moved little; the light as it was with the line before is still there.
     #[inline(always)]
-    fn measure_quietly<R: Summed>(&self, row: usize, pixels: &R) -> Result<Measured, Sums> {
+    fn measure_fast<R: Summed>(&self, row: usize, pixels: &R) -> Result<Measured, Sums> {
         let (Some(table), Some(coefficients)) = (
             self.storage.tables.get(row),
             part(
@@ -202,7 +202,7 @@ impl Tracker<'_> {
         let (product, sum) = pixels.sums(self.config.kernel, coefficients);
         let to_reference = table.factor_to_reference(sum);
         let shift_px = table.shift_px(product * to_reference);
-        let surprise_px = shift_px - self.prediction.rest_px();
+        let surprise_px = shift_px - self.prediction.predicted_px();
         // Neither is true of what is no number.
         let small = shift_px.abs() <= self.near_px && Prediction::is_small(surprise_px);
         if !small || !Flicker::is_plausible(self.to_reference, to_reference) {
@@ -237,24 +237,25 @@ impl Tracker<'_> {
         }
     }
 
-    /// A line that would be quiet, but that it is looked at or that something is done beside it. Where it is refused nothing
-    /// has changed but that.
+    /// A line that would be on the fast path but for a check or a background job. Where it is refused nothing
+    /// but that job has changed.
     #[inline(always)]
-    fn take_calmly<R: Row>(
+    fn take_with_background<R: Row>(
         &mut self,
         line: &Line<'_>,
         pixels: &mut R,
         sums: Sums,
         times: bool,
     ) -> Result<Place, Sums> {
-        let calm = line.row < self.quiet.calm_until_row && line.frame == self.quiet.frame;
-        if !calm || sums.is_some() || pixels.len() != usize::from(self.config.width) {
+        let at_rest =
+            line.row < self.fast_path.background_until_row && line.frame == self.fast_path.frame;
+        if !at_rest || sums.is_some() || pixels.len() != usize::from(self.config.width) {
             return Err(sums);
         }
         let row = usize::from(line.row);
-        let measured = self.measure_quietly(row, pixels)?;
+        let measured = self.measure_fast(row, pixels)?;
         self.effort = 0;
-        if row >= self.attend {
+        if row >= self.next_check {
             let before = core::mem::replace(&mut self.to_reference, measured.to_reference);
             let fits = self.fits(row, pixels.pixels(), measured.shift_px);
             self.to_reference = before;
@@ -262,24 +263,24 @@ impl Tracker<'_> {
                 return Err(None);
             }
             self.note_fit(true);
-            self.after_look(row, pixels.pixels(), Some(measured.shift_px));
-        } else if self.beside {
+            self.after_check(row, pixels.pixels(), Some(measured.shift_px));
+        } else if self.background {
             // The reference is not being moved.
-            self.work_beside::<R::P>(row);
+            self.work_in_background::<R::P>(row);
         }
         let place = self.accept(measured, times);
-        self.settle_quiet(line.frame);
+        self.settle_fast_path(line.frame);
         Ok(place)
     }
 
     /// Everything that a line may come to.
     #[inline(never)]
-    fn take_with_care<R: Row>(
+    fn take_slow<R: Row>(
         &mut self,
         line: &Line<'_>,
         mut pixels: R,
         sums: Sums,
-    ) -> Result<Place, Left> {
+    ) -> Result<Place, Rejected> {
         let row = usize::from(line.row);
         if line.row >= self.config.rows || pixels.len() != usize::from(self.config.width) {
             return Err(self.misfit());
@@ -288,78 +289,79 @@ impl Tracker<'_> {
             self.next_frame(line.frame, line.start_ns);
         }
         let mut aside_px = 0.0;
-        let beside = self.beside && self.stage == Stage::Tracking;
+        let in_background = self.background && self.stage == Stage::Tracking;
         // Then how much time there is is known only afterwards.
-        let afterwards = beside && self.is_hurried();
+        let afterwards = in_background && self.is_hurried();
         if afterwards {
             aside_px = self.follow.aside_px(row);
-            self.look_elsewhere();
-        } else if beside {
-            aside_px = self.work_beside::<R::P>(row);
+            self.search_elsewhere();
+        } else if in_background {
+            aside_px = self.work_in_background::<R::P>(row);
         }
-        // A line that will be looked at has enough to do.
-        let idle = row < self.attend;
+        // A line that will be checked has enough to do.
+        let idle = row < self.next_check;
         self.effort = 0;
         let found = self.locate(row, &mut pixels, aside_px, sums);
-        if afterwards && self.effort < MUCH && (idle || self.follow.is_moving()) {
+        if afterwards && self.effort < PRODUCTS_OF_A_CHECK && (idle || self.follow.is_moving()) {
             let columns = self.config.columns_per_line;
             let fewer = if self.effort > 0 { columns / 4 } else { 0 };
             self.follow_one_step::<R::P>(row, columns - fewer);
-            self.beside = self.follow.is_busy() || self.watch.is_searching();
+            self.background = self.follow.is_busy() || self.check.is_searching();
         }
         if self.stage != Stage::Tracking {
             self.counts.learning = self.counts.learning.wrapping_add(1);
             self.learn(row, pixels.pixels(), found);
-            return Err(Left::Learning);
+            return Err(Rejected::Learning);
         }
-        self.settle_quiet(line.frame);
+        self.settle_fast_path(line.frame);
         let counts = &mut self.counts;
         let count = match found {
             Ok(_) => &mut counts.measured,
-            Err(Left::Disturbed) => &mut counts.disturbed,
+            Err(Rejected::Occluded) => &mut counts.occluded,
             Err(_) => &mut counts.no_texture,
         };
         *count = count.wrapping_add(1);
         found
     }
 
-    fn misfit(&mut self) -> Left {
+    fn misfit(&mut self) -> Rejected {
         self.counts.misfit = self.counts.misfit.wrapping_add(1);
-        Left::Misfit
+        Rejected::Misfit
     }
 
-    /// Which lines will be quiet, after one that was not: none while something is done beside them, while the
+    /// Which lines will be on the fast path, after one that was not: none while there is a background job, while the
     /// motion is swift, and at the beginning of a frame.
-    fn settle_quiet(&mut self, frame: u32) {
+    fn settle_fast_path(&mut self, frame: u32) {
         // Where lines are expected then stays between the shifts of those before, none of which is further than `near_px`.
-        let near = self.prediction.rest_px().abs() < self.here_px;
-        let undisturbed = !self.follow.is_moving() && !self.watch.is_searching();
-        let calm = undisturbed && self.prediction.is_at_rest() && self.flicker.is_settled() && near;
+        let near = self.prediction.predicted_px().abs() < self.here_px;
+        let unhindered = !self.follow.is_moving() && !self.check.is_searching();
+        let at_rest =
+            unhindered && self.prediction.is_at_rest() && self.flicker.is_settled() && near;
         let rows = usize::from(self.config.rows);
-        self.quiet = Quiet {
+        self.fast_path = FastPath {
             frame,
-            until_row: if calm && !self.beside {
-                self.attend.min(rows) as u16
+            until_row: if at_rest && !self.background {
+                self.next_check.min(rows) as u16
             } else {
                 0
             },
-            calm_until_row: if calm { rows as u16 } else { 0 },
+            background_until_row: if at_rest { rows as u16 } else { 0 },
         };
     }
 
-    /// What is done beside a line, when there is something. Returns by how much the row's reference lies to
+    /// The background job of a line, where there is one. Returns by how much the row's reference lies to
     /// the left of the others', px.
     #[cold]
     #[inline(never)]
-    fn work_beside<P: Pixel>(&mut self, row: usize) -> f32 {
+    fn work_in_background<P: Pixel>(&mut self, row: usize) -> f32 {
         let aside_px = self.follow_one_step::<P>(row, self.config.columns_per_line);
-        self.look_elsewhere();
-        self.beside = self.follow.is_busy() || self.watch.is_searching();
+        self.search_elsewhere();
+        self.background = self.follow.is_busy() || self.check.is_searching();
         aside_px
     }
 
-    /// A lost line is looked for where it is its turn.
-    fn look_elsewhere(&mut self) {
+    /// A lost line is searched for at the next start.
+    fn search_elsewhere(&mut self) {
         if let Some(start_px) = self.start_px() {
             self.prediction.suppose(start_px);
         }
@@ -368,7 +370,7 @@ impl Tracker<'_> {
     #[cold]
     fn next_frame(&mut self, frame: u32, start_ns: i64) {
         if self.stage == Stage::Tracking {
-            if self.watch.end_frame(start_ns) {
+            if self.check.end_frame(start_ns) {
                 self.counts.relearned = self.counts.relearned.saturating_add(1);
                 self.relearn();
             } else {
@@ -390,9 +392,9 @@ impl Tracker<'_> {
             .begin_frame(start_ns, self.stage == Stage::Refining);
         #[cfg(feature = "long-exposure")]
         self.look_ahead();
-        self.watch.begin_frame(frame);
-        self.attend = 0;
-        self.beside = self.follow.is_busy() || self.watch.is_searching();
+        self.check.begin_frame(frame);
+        self.next_check = 0;
+        self.background = self.follow.is_busy() || self.check.is_searching();
         self.flicker.begin_frame();
     }
 
@@ -403,45 +405,47 @@ impl Tracker<'_> {
         pixels: &mut R,
         aside_px: f32,
         sums: Sums,
-    ) -> Result<Place, Left> {
+    ) -> Result<Place, Rejected> {
         let Some(&table) = self.storage.tables.get(row) else {
-            return Err(Left::NoTexture);
+            return Err(Rejected::NoTexture);
         };
         if !table.has_texture() {
             self.note_light(row, &table, pixels);
-            return Err(Left::NoTexture);
+            return Err(Rejected::NoTexture);
         }
         let information_per_px2 = table.information_per_px2();
         let expected = self.prediction.at(row) + aside_px;
         let before = self.to_reference;
         let mut shift_px = match self.correlate(row, &table, pixels, expected, sums) {
             Ok(shift_px) => shift_px,
-            Err(Unfound::NoNumber) => return Err(Left::NoTexture),
+            Err(Unfound::NoNumber) => return Err(Rejected::NoTexture),
             Err(Unfound::Unfinished(shift_px)) => {
-                self.leave(shift_px - aside_px);
-                return Err(Left::Disturbed);
+                self.reject_unfinished(shift_px - aside_px);
+                return Err(Rejected::Occluded);
             }
         };
         let surprise = shift_px - expected;
         // After two inner products there is no time for it where it is but its turn; the next one will do.
-        let in_turn = row >= self.attend
-            && (self.effort < MUCH || !self.is_hurried() || self.watch.is_uneasy());
+        let in_turn = row >= self.next_check
+            && (self.effort < PRODUCTS_OF_A_CHECK
+                || !self.is_hurried()
+                || self.check.checks_every_line());
         let due = in_turn
             || surprise * surprise * information_per_px2 > 49.0 + information_per_px2
             || !Flicker::is_plausible(before, self.to_reference);
         let mut jumped = false;
         if due {
-            // A swift picture must be found anew after a gap, and a row that knows so little could take any
+            // A swift picture must be found again after a gap, and a row that knows so little could take any
             // place for it.
             if self.prediction.needs_more_than(information_per_px2) {
-                return Err(Left::NoTexture);
+                return Err(Rejected::NoTexture);
             }
-            let looked = self.look_and_follow(row, &table, pixels.pixels(), shift_px);
-            self.effort = self.effort.saturating_add(MUCH);
-            let Some(looked) = looked else {
-                return Err(Left::Disturbed);
+            let checked = self.check_and_follow(row, &table, pixels.pixels(), shift_px);
+            self.effort = self.effort.saturating_add(PRODUCTS_OF_A_CHECK);
+            let Some(checked) = checked else {
+                return Err(Rejected::Occluded);
             };
-            shift_px = looked;
+            shift_px = checked;
             jumped = (shift_px - expected).abs() > JUMP_PX;
         }
         if self.prediction.is_swift() && aside_px == 0.0 {
@@ -474,35 +478,35 @@ impl Tracker<'_> {
         }
     }
 
-    /// What becomes of a line that is looked at; its shift, unless it is disturbed.
+    /// Checks a line and lets the reference follow it; its shift, unless it is occluded.
     #[cold]
-    fn look_and_follow<P: Pixel>(
+    fn check_and_follow<P: Pixel>(
         &mut self,
         row: usize,
         table: &RowTable,
         pixels: &[P],
         shift_px: f32,
     ) -> Option<f32> {
-        let looked = self.look(row, table, pixels, shift_px);
-        self.after_look(row, pixels, looked);
-        looked
+        let checked = self.check_line(row, table, pixels, shift_px);
+        self.after_check(row, pixels, checked);
+        checked
     }
 
-    /// `looked`: the shift of a line that was found to fit.
-    fn after_look<P: Pixel>(&mut self, row: usize, pixels: &[P], looked: Option<f32>) {
-        if let Some(shift_px) = looked
+    /// `checked`: the shift of a line that was found to fit.
+    fn after_check<P: Pixel>(&mut self, row: usize, pixels: &[P], checked: Option<f32>) {
+        if let Some(shift_px) = checked
             && self.turn == row
         {
             self.follow_row(row, pixels, shift_px);
         }
-        self.attend = self.watch.next_due(row, self.is_hurried());
+        self.next_check = self.check.next_due(row, self.is_hurried());
         if self.turn > row {
-            self.attend = self.attend.min(self.turn);
+            self.next_check = self.next_check.min(self.turn);
         }
-        self.beside = self.follow.is_busy() || self.watch.is_searching();
-        // Some ten microseconds before it is read: between two looks at a row, 32 frames have been through the caches.
+        self.background = self.follow.is_busy() || self.check.is_searching();
+        // Some ten microseconds before it is read: between two checks of a row, 32 frames have been through the caches.
         let width = usize::from(self.config.width);
-        let mean = self.storage.mean.get(self.attend * width..);
+        let mean = self.storage.mean.get(self.next_check * width..);
         kernel::ask_for(mean.and_then(|m| m.get(..width)).unwrap_or_default());
     }
 }

@@ -5,11 +5,12 @@
 //! that motion does not blur the reference (the thesis's Algorithm 1, as a running mean). A second round
 //! over as many frames refines it: only then is the motion's range known, and with it the margin and the
 //! level of the band. Then it *tracks*: one inner product a line, at the whole shift where the rows
-//! before it were. Now and then, and whenever a line surprises, it looks whether the line still resembles
-//! its reference (`watch.rs`); if not, it searches, and if that finds nothing either, the line is
-//! disturbed. The reference slowly follows the picture (`follow.rs`).
+//! before it were. Now and then, and whenever a line surprises, it checks whether the line still resembles
+//! its reference (`check.rs`); if not, it searches, and if that finds nothing either, the line is
+//! occluded. The reference slowly follows the picture (`follow.rs`).
 
 mod blur;
+mod check;
 mod config;
 mod correlate;
 mod counts;
@@ -26,7 +27,6 @@ mod row;
 mod storage;
 #[cfg(test)]
 mod tests;
-mod watch;
 
 pub use config::{Config, ConfigError};
 pub use counts::Counts;
@@ -42,15 +42,15 @@ use crate::{
     timeline::{Begin, Binner, Curvature, Displacement, RowShift, Sample},
 };
 use blur::Blur;
+use check::Check;
 use correlate::NEAR_WHILE_LEARNING_PX;
 use flicker::Flicker;
 use follow::Follow;
-use line::{Left, Place, Quiet};
+use line::{FastPath, Place, Rejected};
 use predict::Prediction;
 use row::Row;
-use watch::Watch;
 
-/// What a line came to.
+/// The outcome of a line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Outcome {
     /// Its shift.
@@ -60,7 +60,7 @@ pub enum Outcome {
     /// The row has too little texture.
     NoTexture,
     /// The line does not look like its reference: something passes through the picture.
-    Disturbed,
+    Occluded,
     /// The line has another width, or a row that is not there.
     Misfit,
 }
@@ -86,7 +86,7 @@ pub struct Tracker<'a> {
     recipe: Recipe,
     stage: Stage,
     frame: Option<u32>,
-    quiet: Quiet,
+    fast_path: FastPath,
     frames_in_stage: u16,
     prediction: Prediction,
     /// The factor that brings the last line to its reference's brightness.
@@ -98,18 +98,18 @@ pub struct Tracker<'a> {
     meter: NoiseMeter,
     /// Largest shift met in this round, px.
     range_px: f32,
-    watch: Watch,
+    check: Check,
     follow: Follow,
     /// See [`Tracker::curvature`]; where lines are not unsmeared one by one.
     curvature: Curvature,
     /// The row of this frame from which the reference is followed; none while learning.
     turn: usize,
-    /// There is something to be done beside the next line: the reference is followed, or a lost picture
-    /// is looked for.
-    beside: bool,
-    /// The row from which on the next line is looked at.
-    attend: usize,
-    /// What the line has taken beyond most: inner products where it had moved by whole pixels, and looks, each as two.
+    /// A background job waits for the next line: the reference is followed, or a lost picture
+    /// is searched for.
+    background: bool,
+    /// The row from which on the next line is checked.
+    next_check: usize,
+    /// What the line has taken beyond most: inner products where it had moved by whole pixels, and checks, each as two.
     effort: u8,
     /// A line that is expected nearer than this is read where its reference lies: half the pixels from one to the next of
     /// the same colour, or `near_px` where a line time is short, as reading it elsewhere takes longer.
@@ -146,7 +146,7 @@ impl<'a> Tracker<'a> {
             },
             stage: Stage::Rough,
             frame: None,
-            quiet: Quiet::default(),
+            fast_path: FastPath::default(),
             frames_in_stage: 0,
             prediction: Prediction::default(),
             to_reference: 1.0,
@@ -160,12 +160,12 @@ impl<'a> Tracker<'a> {
             ),
             meter: NoiseMeter::default(),
             range_px: 0.0,
-            watch: Watch::default(),
+            check: Check::default(),
             follow: Follow::default(),
             curvature: Curvature::default(),
             turn: usize::MAX,
-            beside: false,
-            attend: 0,
+            background: false,
+            next_check: 0,
             effort: 0,
             here_px: 0.0,
             near_px: NEAR_WHILE_LEARNING_PX * f32::from(config.stride),
@@ -284,7 +284,7 @@ impl<'a> Tracker<'a> {
         pixels: &UpperBytes<'_>,
         binner: &mut Binner,
     ) -> Option<Sample> {
-        match self.take_quietly(line, pixels, false) {
+        match self.take_fast(line, pixels, false) {
             // At rest, so not swift.
             Ok(place) => self.pass_on(line, place, self.curvature, binner),
             Err(sums) => self.take_scattered_otherwise_into(line, pixels, sums, binner),
@@ -298,7 +298,7 @@ impl<'a> Tracker<'a> {
         pixels: R,
         binner: &mut Binner,
     ) -> Option<Sample> {
-        match self.take_quietly(line, &pixels, false) {
+        match self.take_fast(line, &pixels, false) {
             // At rest, so not swift.
             Ok(place) => self.pass_on(line, place, self.curvature, binner),
             Err(sums) => self.take_otherwise_into(line, pixels, sums, binner),
@@ -306,7 +306,7 @@ impl<'a> Tracker<'a> {
     }
 
     #[inline(always)]
-    fn outcome(&self, line: &Line<'_>, place: Result<Place, Left>) -> Outcome {
+    fn outcome(&self, line: &Line<'_>, place: Result<Place, Rejected>) -> Outcome {
         match place {
             Ok(place) => Outcome::Measured(Displacement {
                 frame: line.frame,
@@ -318,10 +318,10 @@ impl<'a> Tracker<'a> {
                 information_per_px2: place.information_per_px2,
                 vertical: None,
             }),
-            Err(Left::Learning) => Outcome::Learning,
-            Err(Left::NoTexture) => Outcome::NoTexture,
-            Err(Left::Disturbed) => Outcome::Disturbed,
-            Err(Left::Misfit) => Outcome::Misfit,
+            Err(Rejected::Learning) => Outcome::Learning,
+            Err(Rejected::NoTexture) => Outcome::NoTexture,
+            Err(Rejected::Occluded) => Outcome::Occluded,
+            Err(Rejected::Misfit) => Outcome::Misfit,
         }
     }
 

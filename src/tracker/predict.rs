@@ -101,7 +101,7 @@ impl Prediction {
 
     /// [`Prediction::at`] of a motion that [`Prediction::is_at_rest`], px.
     #[inline(always)]
-    pub(super) fn rest_px(&self) -> f32 {
+    pub(super) fn predicted_px(&self) -> f32 {
         self.shift_px
     }
 
@@ -172,7 +172,7 @@ impl Prediction {
         }
     }
 
-    /// A swift picture must be found anew after a gap, and a row that knows so little could take any place
+    /// A swift picture must be found again after a gap, and a row that knows so little could take any place
     /// for it.
     pub(super) fn needs_more_than(&self, information: f32) -> bool {
         self.is_swift() && self.known == 0 && information < 0.25 * self.usual_information

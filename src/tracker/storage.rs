@@ -21,7 +21,7 @@ pub struct Storage<'a> {
     pub mask: &'a mut [u8],
     /// width: what learning needs of the columns.
     pub columns: &'a mut [ColumnLearning],
-    /// width: the coefficients of a row that is being built anew while its old ones still serve.
+    /// width: the coefficients of a row that is being built again while its old ones still serve.
     pub fresh: &'a mut [i8],
     /// 2 × width: scratch of building coefficients.
     pub scratch: &'a mut [f32],

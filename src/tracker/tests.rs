@@ -218,7 +218,7 @@ fn a_hand_is_flagged_and_poisons_nothing() {
     for _ in 0..20 {
         let outcomes = camera.show(&mut tracker, still, hand);
         assert!(
-            outcomes.iter().all(|o| *o == Outcome::Disturbed),
+            outcomes.iter().all(|o| *o == Outcome::Occluded),
             "{outcomes:?}"
         );
     }
@@ -304,7 +304,7 @@ fn a_shift_beyond_all_bounds_overflows_nothing() {
                 if let Ok(shift_px) = tracker.correlate(3, &table, &mut &line[..], huge, None) {
                     assert!(shift_px.abs() <= WIDTH as f32);
                 }
-                assert!(tracker.rest(3, &line, huge).is_none());
+                assert!(tracker.residual(3, &line, huge).is_none());
                 tracker.follow_row(3, &line, huge);
                 tracker.measure_noise(3, &line, huge, 9);
             }

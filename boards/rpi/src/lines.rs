@@ -267,7 +267,7 @@ impl<'a> Lines<'a> {
 fn warnings(light: &Light, now: Counts, told: &mut Counts) -> Warnings {
     let measured = now.measured - told.measured;
     let no_texture = now.no_texture - told.no_texture;
-    let disturbed = now.disturbed - told.disturbed;
+    let disturbed = now.occluded - told.occluded;
     let all = measured + no_texture + disturbed;
     let mut warnings = Warnings::NONE;
     warnings.insert_if(disturbed * 100 > all, Warning::Occluded);

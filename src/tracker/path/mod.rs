@@ -150,7 +150,7 @@ impl Paths {
         }
     }
 
-    /// Ends a round of learning; the next one's frames are counted anew.
+    /// Ends a round of learning; the next one's frames are counted again.
     pub(super) fn end_round(&mut self, refined: bool) {
         self.ahead = Ahead::default();
         if refined {

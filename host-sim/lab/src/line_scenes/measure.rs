@@ -129,7 +129,7 @@ pub fn measure(case: &Case) -> Result<Figures, CaseError> {
     let counts = tracker.counts();
     let mut figures = sums.figures();
     figures.no_texture = counts.no_texture as f64 / lines;
-    figures.disturbed = counts.disturbed as f64 / lines;
+    figures.disturbed = counts.occluded as f64 / lines;
     figures.relearned = counts.relearned;
     figures.slips_told = tracker.slips() > 0;
     if case.peaks {

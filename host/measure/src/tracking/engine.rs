@@ -26,7 +26,7 @@ impl Unmeasured {
         let count = |count: fn(&Counts) -> u64| count(after).wrapping_sub(count(before)) as u32;
         Self {
             no_texture: count(|c| c.no_texture) + count(|c| c.misfit),
-            disturbed: count(|c| c.disturbed),
+            disturbed: count(|c| c.occluded),
             learning: count(|c| c.learning),
         }
     }

@@ -1,9 +1,9 @@
-//! Does a line still look like its reference?
+//! Whether a line still resembles its reference.
 //!
 //! The inner product alone cannot tell a moving surface from a hand in front of it. So now and then, and
 //! whenever a line surprises, what the line leaves over after its shifted reference is taken off is
 //! compared with the pixels' noise and with what an error of the shift would leave. A line that fails is
-//! searched for over the whole range of motion; if it is not found either, it is disturbed, and so are
+//! searched for over the whole range of motion; if it is not found either, it is occluded, and so are
 //! the following ones until one fits again.
 
 use super::{
@@ -12,18 +12,18 @@ use super::{
 };
 use crate::{camera::pixel::Pixel, reference::RowTable, reference::noise::LEAST_VARIANCE};
 
-/// In tracking one row in this many is looked at even if it does not surprise; and where a line time is short.
+/// While tracking, one row in this many is checked even if it does not surprise; and where a line time is short.
 const EVERY: usize = 32;
 const EVERY_IN_A_HURRY: usize = 64;
 
-/// Columns that are looked at, about: of a line that may be anywhere, of one among others that fitted, where a line time is
+/// Columns that a check reads, about: of a line that may be anywhere, of one among others that fitted, where a line time is
 /// short, and where the line has moved by whole pixels then, which takes longer.
 const COLUMNS: usize = 48;
 const COLUMNS_AMONG_FITTING: usize = 24;
 const COLUMNS_IN_A_HURRY: usize = 12;
 const COLUMNS_IN_MORE_HURRY: usize = 10;
 
-/// A search begins anew every so many pixels of one colour: where correlation converges from on a sharp
+/// A search begins again every so many pixels of one colour: where correlation converges from on a sharp
 /// texture too.
 const START_STEPS: i32 = 2;
 
@@ -35,14 +35,14 @@ const NEW_SCENE_NS: i64 = 1_500_000_000;
 
 /// What the watch remembers.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Watch {
-    /// The last line looked at did not fit, or the frame has just begun: look at every line.
+pub(super) struct Check {
+    /// The last line checked did not fit, or the frame has just begun: check every line.
     every_line: bool,
-    /// Remainder of the rows that are looked at in this frame.
+    /// Remainder of the rows that are checked in this frame.
     turn: usize,
     /// Lines to wait before the next search, while nothing fits.
-    rest: u8,
-    /// While nothing fits and a line has no time for a whole search: so many lines were looked for since.
+    lines_to_search: u8,
+    /// While nothing fits and a line has no time for a whole search: the number of starts tried since.
     start: Option<u16>,
     /// Lines of this frame that fitted, and that did not.
     fitted: u32,
@@ -54,19 +54,19 @@ pub(super) struct Watch {
     usual_px2: f32,
 }
 
-impl Watch {
-    /// A line is looked for, one start a line.
+impl Check {
+    /// A lost picture is searched for, one start a line.
     #[inline(always)]
     pub(super) fn is_searching(&self) -> bool {
         self.start.is_some()
     }
 
-    /// Every line is to be looked at, and not only because a frame has just begun.
-    pub(super) fn is_uneasy(&self) -> bool {
+    /// Every line is to be checked, and not only because a frame has just begun.
+    pub(super) fn checks_every_line(&self) -> bool {
         self.every_line && (self.unfit > 0 || self.is_searching())
     }
 
-    /// The next row to be looked at after `row`.
+    /// The next row to be checked after `row`.
     pub(super) fn next_due(&self, row: usize, hurried: bool) -> usize {
         if self.every_line {
             return 0;
@@ -80,7 +80,7 @@ impl Watch {
     pub(super) fn begin_frame(&mut self, frame: u32) {
         self.turn = frame as usize % EVERY_IN_A_HURRY;
         self.every_line = true;
-        self.rest = 0;
+        self.lines_to_search = 0;
         self.fitted = 0;
         self.unfit = 0;
     }
@@ -102,25 +102,25 @@ impl Watch {
 }
 
 /// What a line leaves over, per pixel and in units of the pixels' variance.
-pub(super) struct Rest {
+pub(super) struct Residual {
     /// Mean square of what is left.
     power: f32,
     /// Mean square that an error of the shift of 1 px would leave.
     slope_power: f32,
 }
 
-impl Rest {
+impl Residual {
     /// What noise does not explain, as the square of an error of the shift, px².
-    fn left_px2(&self) -> f32 {
+    fn excess_px2(&self) -> f32 {
         (self.power - 2.0).max(0.0) / self.slope_power.max(1e-9)
     }
 }
 
 impl Tracker<'_> {
-    /// Looks whether a line at `shift_px` resembles its reference. Returns its shift, found anew if need
-    /// be, or `None` for a disturbed line.
+    /// Checks whether a line at `shift_px` resembles its reference. Returns its shift, found again if need
+    /// be, or `None` for an occluded line.
     #[cold]
-    pub(super) fn look<P: Pixel>(
+    pub(super) fn check_line<P: Pixel>(
         &mut self,
         row: usize,
         table: &RowTable,
@@ -133,9 +133,9 @@ impl Tracker<'_> {
             return fits.then_some(shift_px);
         }
         let mut fit = self.fits(row, pixels, shift_px).then_some(shift_px);
-        if fit.is_none() && self.watch.rest == 0 {
-            self.watch.rest = 8;
-            self.watch.every_line = true;
+        if fit.is_none() && self.check.lines_to_search == 0 {
+            self.check.lines_to_search = 8;
+            self.check.every_line = true;
             fit = self
                 .search(row, table, pixels)
                 .and_then(|near| self.correlate(row, table, &mut &*pixels, near, None).ok())
@@ -145,57 +145,62 @@ impl Tracker<'_> {
         fit
     }
 
-    /// Remembers whether a line that was looked at fitted.
+    /// Remembers whether a line that was checked fitted.
     pub(super) fn note_fit(&mut self, fits: bool) {
-        self.watch.every_line = !fits;
-        self.watch.rest = self.watch.rest.saturating_sub(1);
+        self.check.every_line = !fits;
+        self.check.lines_to_search = self.check.lines_to_search.saturating_sub(1);
         if fits {
-            self.watch.fitted += 1;
-            self.watch.start = None;
+            self.check.fitted += 1;
+            self.check.start = None;
         } else {
             // The brightness is that of something else.
             self.to_reference = 1.0;
-            self.watch.unfit += 1;
+            self.check.unfit += 1;
             if self.is_hurried() {
-                self.watch.start = Some(self.watch.start.map_or(0, |s| s.wrapping_add(1)));
+                self.check.start = Some(self.check.start.map_or(0, |s| s.wrapping_add(1)));
             }
         }
     }
 
-    /// Where a line has no time to be correlated to the end: it is as good as disturbed, the next one is
+    /// Where a line has no time to be correlated to the end: it is as good as occluded, the next one is
     /// expected where it seemed to be.
     #[cold]
-    pub(super) fn leave(&mut self, shift_px: f32) {
-        if !self.watch.is_searching() {
+    pub(super) fn reject_unfinished(&mut self, shift_px: f32) {
+        if !self.check.is_searching() {
             self.prediction.suppose(shift_px);
         }
         self.note_fit(false);
-        self.attend = 0;
-        self.beside = true;
+        self.next_check = 0;
+        self.background = true;
     }
 
     pub(super) fn fits<P: Pixel>(&mut self, row: usize, pixels: &[P], shift_px: f32) -> bool {
-        let Some(rest) = self.rest(row, pixels, shift_px) else {
+        let Some(residual) = self.residual(row, pixels, shift_px) else {
             return false;
         };
         // While learning, the reference is still blurred and a still background not yet known.
         let allowed_px2 = match self.stage {
-            Stage::Tracking => 0.2 + 4.0 * self.watch.usual_px2,
+            Stage::Tracking => 0.2 + 4.0 * self.check.usual_px2,
             Stage::Rough | Stage::Refining => 2.0,
         };
-        let mut fits = rest.power <= 5.0 + allowed_px2 * rest.slope_power;
+        let mut fits = residual.power <= 5.0 + allowed_px2 * residual.slope_power;
         if fits && self.is_strict() {
-            fits = rest.left_px2() < self.well_px2();
+            fits = residual.excess_px2() < self.well_px2();
         }
-        if fits && self.stage == Stage::Refining && rest.slope_power > 0.0 {
-            self.watch
-                .learn((rest.power - 2.0).max(0.0) / rest.slope_power);
+        if fits && self.stage == Stage::Refining && residual.slope_power > 0.0 {
+            self.check
+                .learn((residual.power - 2.0).max(0.0) / residual.slope_power);
         }
         fits
     }
 
     /// What is left of a line when its reference, shifted, is taken off; some columns serve.
-    pub(super) fn rest<P: Pixel>(&self, row: usize, pixels: &[P], shift_px: f32) -> Option<Rest> {
+    pub(super) fn residual<P: Pixel>(
+        &self,
+        row: usize,
+        pixels: &[P],
+        shift_px: f32,
+    ) -> Option<Residual> {
         let width = pixels.len();
         let r = &self.recipe;
         let mean = self.storage.mean.get(row * width..)?.get(..width)?;
@@ -209,7 +214,7 @@ impl Tracker<'_> {
         );
         let line = pixels.get(overlap.line)?;
         let columns = match self.config.columns_per_line {
-            u16::MAX if self.watch.every_line || self.stage != Stage::Tracking => COLUMNS,
+            u16::MAX if self.check.every_line || self.stage != Stage::Tracking => COLUMNS,
             u16::MAX => COLUMNS_AMONG_FITTING,
             _ if self.effort == 0 => COLUMNS_IN_A_HURRY,
             _ => COLUMNS_IN_MORE_HURRY,
@@ -231,7 +236,7 @@ impl Tracker<'_> {
         let near = near / r.stride as f32;
         let saturation = r.saturation * r.counts_per_value;
         let per_count = r.noise.per_value * value;
-        let (mut power, mut slopes, mut looked) = (0.0f32, 0.0f32, 0u16);
+        let (mut power, mut slopes, mut read) = (0.0f32, 0.0f32, 0u16);
         // Not at the very edge, which a reference that was moved does not know.
         let mut next = step / 2;
         while next < n {
@@ -253,7 +258,7 @@ impl Tracker<'_> {
             let slope = right - left;
             let bend = right + left - 2.0 * here;
             let model = here - 0.5 * near * (slope - near * bend);
-            let rest = f32::from(p.value()) - gain * model;
+            let residual = f32::from(p.value()) - gain * model;
             let variance = r.noise.dark + per_count * here;
             let weight = 1.0
                 / if variance > LEAST_VARIANCE {
@@ -261,14 +266,14 @@ impl Tracker<'_> {
                 } else {
                     LEAST_VARIANCE
                 };
-            power += rest * rest * weight;
+            power += residual * residual * weight;
             slopes += slope * slope * weight;
-            looked += 1;
+            read += 1;
         }
         let frames = f32::from(self.storage.learning.get(row)?.frames());
-        let own = 1.0 / (f32::from(looked) * (1.0 + 1.0 / frames));
+        let own = 1.0 / (f32::from(read) * (1.0 + 1.0 / frames));
         let slope_px = 0.5 * value / r.stride as f32;
-        (looked >= 4).then_some(Rest {
+        (read >= 4).then_some(Residual {
             power: power * own,
             slope_power: slopes * own * slope_px * slope_px,
         })
@@ -282,18 +287,18 @@ impl Tracker<'_> {
 
     /// A search goes the first time round: only a place that leaves next to nothing over will do.
     fn is_strict(&self) -> bool {
-        matches!(self.watch.start, Some(start) if start > 0 && start <= self.starts())
+        matches!(self.check.start, Some(start) if start > 0 && start <= self.starts())
     }
 
     /// A line that leaves no more over is found for certain, px².
     fn well_px2(&self) -> f32 {
-        WELL_PX2 + 2.0 * self.watch.usual_px2
+        WELL_PX2 + 2.0 * self.check.usual_px2
     }
 
-    /// Where the next line is looked for while nothing fits, px: outwards from the usual place as by
+    /// Where the next line is searched for while nothing fits, px: outwards from the usual place as by
     /// [`Tracker::search`], one start a line. `None` where it is expected as ever.
     pub(super) fn start_px(&self) -> Option<f32> {
-        let start = self.watch.start?.checked_sub(1)? % self.starts();
+        let start = self.check.start?.checked_sub(1)? % self.starts();
         let away = i32::from(start.div_ceil(2)) * START_STEPS * i32::from(self.config.stride);
         let away = if start.is_multiple_of(2) { away } else { -away };
         Some(self.prediction.usual_px() + away as f32)
@@ -318,15 +323,15 @@ impl Tracker<'_> {
                 let Ok(shift_px) = self.correlate(row, table, &mut &*pixels, start_px, None) else {
                     continue;
                 };
-                let Some(rest) = self.rest(row, pixels, shift_px) else {
+                let Some(residual) = self.residual(row, pixels, shift_px) else {
                     continue;
                 };
-                let left_px2 = rest.left_px2();
-                if left_px2 < well_px2 {
+                let excess_px2 = residual.excess_px2();
+                if excess_px2 < well_px2 {
                     return Some(shift_px);
                 }
-                if best.is_none_or(|(least, _)| left_px2 < 0.5 * least) {
-                    best = Some((left_px2, shift_px));
+                if best.is_none_or(|(least, _)| excess_px2 < 0.5 * least) {
+                    best = Some((excess_px2, shift_px));
                 }
             }
         }
