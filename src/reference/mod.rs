@@ -17,19 +17,27 @@
 //! depends on the line.
 
 pub(crate) mod align;
+mod background;
 pub mod band;
 mod build;
+mod learned;
 mod meter;
 pub mod noise;
 mod recipe;
+mod round;
+mod storage;
+mod store;
 
 #[cfg(feature = "long-exposure")]
 use band::{Level, SLOPE};
 
-pub(crate) use build::settle;
 pub use build::{Build, Parts};
+pub use learned::{ColumnLearning, RowLearning};
 pub use meter::NoiseMeter;
 pub use recipe::Recipe;
+pub(crate) use storage::BufferTooShort;
+pub use storage::{StaticStorage, Storage};
+pub(crate) use store::Store;
 
 /// What the line path needs of a row besides its coefficients: 16 bytes.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -202,15 +202,15 @@ impl Tracker<'_> {
         shift_px: f32,
     ) -> Option<Residual> {
         let width = pixels.len();
-        let r = &self.recipe;
-        let mean = self.storage.mean.get(row * width..)?.get(..width)?;
+        let r = self.store.recipe();
+        let mean = self.store.mean(row)?;
         let stride = r.stride as i32;
         let whole = nearest_step(shift_px, stride);
         let near = shift_px - whole as f32;
         let overlap = Overlap::new(width, whole)?;
         let (mean, mask) = (
             mean.get(overlap.reference.clone())?,
-            self.storage.mask.get(overlap.reference)?,
+            self.store.mask().get(overlap.reference)?,
         );
         let line = pixels.get(overlap.line)?;
         let columns = match self.config.columns_per_line {
@@ -270,7 +270,7 @@ impl Tracker<'_> {
             slopes += slope * slope * weight;
             read += 1;
         }
-        let frames = f32::from(self.storage.learning.get(row)?.frames());
+        let frames = f32::from(self.store.learning(row)?.frames());
         let own = 1.0 / (f32::from(read) * (1.0 + 1.0 / frames));
         let slope_px = 0.5 * value / r.stride as f32;
         (read >= 4).then_some(Residual {

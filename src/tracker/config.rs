@@ -1,7 +1,10 @@
 //! How a tracker is to work.
 
-use super::Storage;
-use crate::{camera::Timing, kernel::Kernel, reference::band::Level};
+use crate::{
+    camera::Timing,
+    kernel::Kernel,
+    reference::{BufferTooShort, Storage, band::Level},
+};
 use core::fmt;
 
 /// How a tracker is to work. Plain data, checked by [`Tracker::new`](super::Tracker::new).
@@ -111,6 +114,8 @@ impl Config {
         if self.learn_frames == 0 {
             return Err(ConfigError::LearnFrames);
         }
-        storage.cut(usize::from(self.width), usize::from(self.rows))
+        let (width, rows) = (usize::from(self.width), usize::from(self.rows));
+        let cut = storage.cut(width, rows);
+        cut.map_err(|BufferTooShort { name, has, needs }| ConfigError::Buffer { name, has, needs })
     }
 }

@@ -33,7 +33,7 @@ impl Tracker<'_> {
     /// less than half a step.
     #[inline(always)]
     pub(super) fn sums<R: Row>(&self, row: usize, pixels: &R) -> Option<(f32, f32)> {
-        let coefficients = part(self.storage.coefficients, row, pixels.len())?;
+        let coefficients = self.store.coefficients(row)?;
         Some(pixels.sums(self.config.kernel, coefficients))
     }
 
@@ -96,8 +96,8 @@ impl Tracker<'_> {
         turns: u8,
     ) -> Option<(f32, bool)> {
         let width = pixels.len();
-        let coefficients = part(self.storage.coefficients, row, width)?;
-        let mean = part(self.storage.mean, row, width)?;
+        let coefficients = self.store.coefficients(row)?;
+        let mean = self.store.mean(row)?;
         let stride = i32::from(self.config.stride);
         let limit = width as i32 / 2;
         let steps = |px: f32| nearest_step(px, stride);
@@ -115,7 +115,7 @@ impl Tracker<'_> {
             );
             let from = overlap.unseen.start;
             let unseen = self.config.kernel.light(from, mean.get(overlap.unseen)?);
-            let seen = table.pixel_sum() - unseen as f32 / self.recipe.counts_per_value;
+            let seen = table.pixel_sum() - unseen as f32 / self.store.recipe().counts_per_value;
             self.to_reference = at_least_1(seen) / at_least_1(sum);
             let near = table.shift_px(product * self.to_reference);
             shift_px = whole as f32 + near;
@@ -143,16 +143,9 @@ impl Tracker<'_> {
         let (product, _) = P::part_sums(
             self.config.kernel,
             pixels.get(overlap.line)?,
-            part(self.storage.coefficients, row, width)?,
+            self.store.coefficients(row)?,
             overlap.reference.start,
         );
         Some((whole, product * self.to_reference))
     }
-}
-
-/// A row of a buffer that holds one row after the other.
-#[inline(always)]
-pub(super) fn part<T>(buffer: &[T], row: usize, width: usize) -> Option<&[T]> {
-    let first = row * width;
-    buffer.get(first..first + width)
 }

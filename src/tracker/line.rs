@@ -6,7 +6,7 @@
 
 use super::{
     Stage, Tracker,
-    correlate::{Unfound, part},
+    correlate::Unfound,
     flicker::Flicker,
     predict::Prediction,
     row::{Row, Scattered, Summed},
@@ -29,7 +29,7 @@ const PRODUCTS_OF_A_CHECK: u8 = 2;
 /// Where a line is against the reference, and what it knows of that.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Place {
-    /// Where the reference has been moved to ([`Follow::anchor_px`](super::follow::Follow::anchor_px)) comes on top.
+    /// Where the reference has been moved to ([`Store::anchor_px`](crate::reference::Store::anchor_px)) comes on top.
     pub(super) shift_px: f32,
     pub(super) information_per_px2: f32,
 }
@@ -186,14 +186,9 @@ impl Tracker<'_> {
     /// What a line comes to where the picture has moved little; the light as it was with the line before is still there.
     #[inline(always)]
     fn measure_fast<R: Summed>(&self, row: usize, pixels: &R) -> Result<Measured, Sums> {
-        let (Some(table), Some(coefficients)) = (
-            self.storage.tables.get(row),
-            part(
-                self.storage.coefficients,
-                row,
-                usize::from(self.config.width),
-            ),
-        ) else {
+        let (Some(table), Some(coefficients)) =
+            (self.store.table(row), self.store.coefficients(row))
+        else {
             return Err(None);
         };
         if !table.has_texture() {
@@ -293,7 +288,7 @@ impl Tracker<'_> {
         // Then how much time there is is known only afterwards.
         let afterwards = in_background && self.is_hurried();
         if afterwards {
-            aside_px = self.follow.aside_px(row);
+            aside_px = self.store.aside_px(row);
             self.search_elsewhere();
         } else if in_background {
             aside_px = self.work_in_background::<R::P>(row);
@@ -302,11 +297,11 @@ impl Tracker<'_> {
         let idle = row < self.next_check;
         self.effort = 0;
         let found = self.locate(row, &mut pixels, aside_px, sums);
-        if afterwards && self.effort < PRODUCTS_OF_A_CHECK && (idle || self.follow.is_moving()) {
+        if afterwards && self.effort < PRODUCTS_OF_A_CHECK && (idle || self.store.is_moving()) {
             let columns = self.config.columns_per_line;
             let fewer = if self.effort > 0 { columns / 4 } else { 0 };
-            self.follow_one_step::<R::P>(row, columns - fewer);
-            self.background = self.follow.is_busy() || self.check.is_searching();
+            self.store.advance_background::<R::P>(row, columns - fewer);
+            self.background = self.store.is_busy() || self.check.is_searching();
         }
         if self.stage != Stage::Tracking {
             self.counts.learning = self.counts.learning.wrapping_add(1);
@@ -334,7 +329,7 @@ impl Tracker<'_> {
     fn settle_fast_path(&mut self, frame: u32) {
         // Where lines are expected then stays between the shifts of those before, none of which is further than `near_px`.
         let near = self.prediction.predicted_px().abs() < self.here_px;
-        let unhindered = !self.follow.is_moving() && !self.check.is_searching();
+        let unhindered = !self.store.is_moving() && !self.check.is_searching();
         let at_rest =
             unhindered && self.prediction.is_at_rest() && self.flicker.is_settled() && near;
         let rows = usize::from(self.config.rows);
@@ -354,9 +349,11 @@ impl Tracker<'_> {
     #[cold]
     #[inline(never)]
     fn work_in_background<P: Pixel>(&mut self, row: usize) -> f32 {
-        let aside_px = self.follow_one_step::<P>(row, self.config.columns_per_line);
+        let aside_px = self
+            .store
+            .advance_background::<P>(row, self.config.columns_per_line);
         self.search_elsewhere();
-        self.background = self.follow.is_busy() || self.check.is_searching();
+        self.background = self.store.is_busy() || self.check.is_searching();
         aside_px
     }
 
@@ -364,6 +361,15 @@ impl Tracker<'_> {
     fn search_elsewhere(&mut self) {
         if let Some(start_px) = self.start_px() {
             self.prediction.suppose(start_px);
+        }
+    }
+
+    /// Once a frame: the reference follows a picture that creeps.
+    fn follow_drift(&mut self) {
+        if self.prediction.is_sure()
+            && let Some(by_px) = self.store.follow_drift(self.prediction.at(0))
+        {
+            self.prediction.move_by(-by_px);
         }
     }
 
@@ -384,7 +390,10 @@ impl Tracker<'_> {
         }
         self.frames_in_stage = self.frames_in_stage.saturating_add(1);
         self.frame = Some(frame);
-        self.turn = self.turn_of(frame);
+        self.turn = match self.stage {
+            Stage::Tracking => self.store.turn_of(frame, self.is_hurried()),
+            Stage::Rough | Stage::Refining => usize::MAX,
+        };
         self.prediction
             .begin_frame(start_ns, self.stage != Stage::Rough);
         #[cfg(feature = "long-exposure")]
@@ -394,7 +403,7 @@ impl Tracker<'_> {
         self.look_ahead();
         self.check.begin_frame(frame);
         self.next_check = 0;
-        self.background = self.follow.is_busy() || self.check.is_searching();
+        self.background = self.store.is_busy() || self.check.is_searching();
         self.flicker.begin_frame();
     }
 
@@ -406,7 +415,7 @@ impl Tracker<'_> {
         aside_px: f32,
         sums: Sums,
     ) -> Result<Place, Rejected> {
-        let Some(&table) = self.storage.tables.get(row) else {
+        let Some(&table) = self.store.table(row) else {
             return Err(Rejected::NoTexture);
         };
         if !table.has_texture() {
@@ -468,7 +477,10 @@ impl Tracker<'_> {
     fn note_light<R: Row>(&mut self, row: usize, table: &RowTable, pixels: &R) {
         let columns = self.config.kernel.light_columns(self.config.width);
         let mean = table.pixel_sum() / f32::from(columns);
-        let (dark, bright) = (self.recipe.saturation / 16.0, self.recipe.saturation * 0.6);
+        let (dark, bright) = (
+            self.store.recipe().saturation / 16.0,
+            self.store.recipe().saturation * 0.6,
+        );
         if !(dark..bright).contains(&mean) {
             return;
         }
@@ -497,16 +509,16 @@ impl Tracker<'_> {
         if let Some(shift_px) = checked
             && self.turn == row
         {
-            self.follow_row(row, pixels, shift_px);
+            let hurried = self.is_hurried();
+            self.store
+                .follow_row(row, pixels, shift_px, self.to_reference, hurried);
         }
         self.next_check = self.check.next_due(row, self.is_hurried());
         if self.turn > row {
             self.next_check = self.next_check.min(self.turn);
         }
-        self.background = self.follow.is_busy() || self.check.is_searching();
+        self.background = self.store.is_busy() || self.check.is_searching();
         // Some ten microseconds before it is read: between two checks of a row, 32 frames have been through the caches.
-        let width = usize::from(self.config.width);
-        let mean = self.storage.mean.get(self.next_check * width..);
-        kernel::ask_for(mean.and_then(|m| m.get(..width)).unwrap_or_default());
+        kernel::ask_for(self.store.mean(self.next_check).unwrap_or_default());
     }
 }

@@ -7,7 +7,7 @@
 //! level of the band. Then it *tracks*: one inner product a line, at the whole shift where the rows
 //! before it were. Now and then, and whenever a line surprises, it checks whether the line still resembles
 //! its reference (`check.rs`); if not, it searches, and if that finds nothing either, the line is
-//! occluded. The reference slowly follows the picture (`follow.rs`).
+//! occluded. The reference slowly follows the picture, as a background job.
 
 mod blur;
 mod check;
@@ -15,7 +15,6 @@ mod config;
 mod correlate;
 mod counts;
 mod flicker;
-mod follow;
 mod gap;
 mod learn;
 mod line;
@@ -24,28 +23,22 @@ mod overlap;
 mod path;
 mod predict;
 mod row;
-mod storage;
 #[cfg(test)]
 mod tests;
 
+pub use crate::reference::{ColumnLearning, RowLearning, StaticStorage, Storage};
 pub use config::{Config, ConfigError};
 pub use counts::Counts;
-pub use learn::{ColumnLearning, RowLearning};
-pub use storage::{StaticStorage, Storage};
 
 use crate::{
     camera::{Line, Pixels, UpperBytes},
-    reference::NoiseMeter,
-    reference::band::Level,
-    reference::noise::PixelNoise,
-    reference::{Recipe, RowTable},
+    reference::{NoiseMeter, Recipe, RowTable, Store, band::Level, noise::PixelNoise},
     timeline::{Begin, Binner, Curvature, Displacement, RowShift, Sample},
 };
 use blur::Blur;
 use check::Check;
 use correlate::NEAR_WHILE_LEARNING_PX;
 use flicker::Flicker;
-use follow::Follow;
 use line::{FastPath, Place, Rejected};
 use predict::Prediction;
 use row::Row;
@@ -80,10 +73,9 @@ pub enum Stage {
 #[derive(Debug)]
 pub struct Tracker<'a> {
     config: Config,
-    storage: Storage<'a>,
+    store: Store<'a>,
     /// Where a line of scattered pixels is brought together.
     room: &'a mut [u8],
-    recipe: Recipe,
     stage: Stage,
     frame: Option<u32>,
     fast_path: FastPath,
@@ -99,7 +91,6 @@ pub struct Tracker<'a> {
     /// Largest shift met in this round, px.
     range_px: f32,
     check: Check,
-    follow: Follow,
     /// See [`Tracker::curvature`]; where lines are not unsmeared one by one.
     curvature: Curvature,
     /// The row of this frame from which the reference is followed; none while learning.
@@ -131,19 +122,19 @@ impl<'a> Tracker<'a> {
             config.kernel = config.kernel.with_half_the_light();
         }
         let values = f32::from(1u16 << (config.bits - 1)) * 2.0;
+        let recipe = Recipe {
+            level: config.level.unwrap_or(Level::Medium),
+            stride: usize::from(config.stride),
+            margin_px: 0,
+            noise: PixelNoise::guess(values),
+            counts_per_value: 32768.0 / values,
+            saturation: values * (254.0 / 256.0),
+            kernel: config.kernel,
+        };
         let mut tracker = Self {
             config,
-            storage,
+            store: Store::new(storage, recipe, config.width),
             room: &mut [],
-            recipe: Recipe {
-                level: config.level.unwrap_or(Level::Medium),
-                stride: usize::from(config.stride),
-                margin_px: 0,
-                noise: PixelNoise::guess(values),
-                counts_per_value: 32768.0 / values,
-                saturation: values * (254.0 / 256.0),
-                kernel: config.kernel,
-            },
             stage: Stage::Rough,
             frame: None,
             fast_path: FastPath::default(),
@@ -161,7 +152,6 @@ impl<'a> Tracker<'a> {
             meter: NoiseMeter::default(),
             range_px: 0.0,
             check: Check::default(),
-            follow: Follow::default(),
             curvature: Curvature::default(),
             turn: usize::MAX,
             background: false,
@@ -191,17 +181,17 @@ impl<'a> Tracker<'a> {
 
     /// Noise of one pixel, as measured while learning.
     pub fn pixel_noise(&self) -> PixelNoise {
-        self.recipe.noise
+        self.store.recipe().noise
     }
 
     /// The band's level in use.
     pub fn level(&self) -> Level {
-        self.recipe.level
+        self.store.recipe().level
     }
 
     /// The rows' tables, one a row.
     pub fn tables(&self) -> &[RowTable] {
-        self.storage.tables
+        self.store.tables()
     }
 
     /// Curvature of the rows, mean by information: what a fast tone's amplitude needs, told with every sample. 0 while
@@ -314,7 +304,7 @@ impl<'a> Tracker<'a> {
                 time_ns: self.middle_ns(line).wrapping_add(i64::from(
                     self.flicker.delay_ns(self.to_reference).unwrap_or(0.0) as i32,
                 )),
-                shift_px: place.shift_px + self.follow.anchor_px(),
+                shift_px: place.shift_px + self.store.anchor_px(),
                 information_per_px2: place.information_per_px2,
                 vertical: None,
             }),
@@ -347,7 +337,7 @@ impl<'a> Tracker<'a> {
             middle_ns: self.middle_ns(line),
             curvature,
             to_reference: self.to_reference,
-            anchor_px: self.follow.anchor_px(),
+            anchor_px: self.store.anchor_px(),
         })
     }
 

@@ -213,7 +213,7 @@ fn a_hand_is_flagged_and_poisons_nothing() {
     let mut tracker = memory.tracker(1);
     camera.teach(&mut tracker, still);
     camera.show(&mut tracker, still, |_, _| ());
-    let before = tracker.storage.mean.to_vec();
+    let before = tracker.store.buffers().mean.to_vec();
     let hand = |_: u16, pixels: &mut [u8; WIDTH]| pixels[20..80].fill(90);
     for _ in 0..20 {
         let outcomes = camera.show(&mut tracker, still, hand);
@@ -222,7 +222,7 @@ fn a_hand_is_flagged_and_poisons_nothing() {
             "{outcomes:?}"
         );
     }
-    assert!(tracker.storage.mean == &before[..]);
+    assert!(tracker.store.buffers().mean == &before[..]);
     // Gone: the very next line counts again.
     let after = errors(&camera.show(&mut tracker, still, |_, _| ()), still);
     assert!(after.iter().all(|e| e.abs() < 0.1), "{after:?}");
@@ -263,7 +263,7 @@ fn a_creeping_picture_is_followed_beyond_where_its_reference_was() {
         last = errors(&camera.show(&mut tracker, creep, |_, _| ()), creep);
     }
     // 5 px on. The reference takes in a little of the picture all the time, half a pixel behind it.
-    assert!(tracker.follow.anchor_px() >= 3.0);
+    assert!(tracker.store.anchor_px() >= 3.0);
     for (a, b) in first.iter().zip(&last) {
         assert!((a - b).abs() < 0.2, "{a} {b}");
     }
@@ -282,10 +282,10 @@ fn dead_columns_are_left_out() {
     errors(&outcomes, &swing);
     let reach = MAX_HALF;
     let masked: Vec<usize> = (0..WIDTH)
-        .filter(|&x| tracker.storage.mask[x] == 0)
+        .filter(|&x| tracker.store.buffers().mask[x] == 0)
         .collect();
     assert_eq!(masked, (40 - reach..=40 + reach).collect::<Vec<_>>());
-    for row in tracker.storage.coefficients.chunks(WIDTH) {
+    for row in tracker.store.buffers().coefficients.chunks(WIDTH) {
         assert_eq!(row[40], 0);
     }
 }
@@ -296,8 +296,8 @@ fn a_shift_beyond_all_bounds_overflows_nothing() {
         let (mut memory, mut camera) = (Memory::new(), Camera::new(surface));
         let mut tracker = memory.tracker(stride);
         camera.teach(&mut tracker, still);
-        let before = tracker.storage.mean.to_vec();
-        let table = tracker.storage.tables[3];
+        let before = tracker.store.buffers().mean.to_vec();
+        let table = tracker.store.buffers().tables[3];
         let line = [100u8; WIDTH];
         for huge in [2e9, 5e9, 1e19, f32::MAX, f32::INFINITY] {
             for huge in [huge, -huge] {
@@ -305,11 +305,11 @@ fn a_shift_beyond_all_bounds_overflows_nothing() {
                     assert!(shift_px.abs() <= WIDTH as f32);
                 }
                 assert!(tracker.residual(3, &line, huge).is_none());
-                tracker.follow_row(3, &line, huge);
+                tracker.store.follow_row(3, &line, huge, 1.0, false);
                 tracker.measure_noise(3, &line, huge, 9);
             }
         }
-        assert!(tracker.storage.mean == &before[..]);
+        assert!(tracker.store.buffers().mean == &before[..]);
         let errors = errors(&camera.show(&mut tracker, still, |_, _| ()), still);
         assert!(errors.iter().all(|e| e.abs() < 0.1), "{errors:?}");
     }
@@ -359,7 +359,7 @@ fn in_a_hurry_a_creeping_picture_is_followed_row_by_row() {
     let creep = |t: f32| 0.5 * t;
     camera.teach(&mut tracker, creep);
     let first = errors(&camera.show(&mut tracker, creep, |_, _| ()), creep);
-    let mut built = tracker.storage.tables.to_vec();
+    let mut built = tracker.store.buffers().tables.to_vec();
     let mut rebuilt = 0;
     for _ in 0..500 {
         // No frame is left out while the reference is moved.
@@ -367,12 +367,12 @@ fn in_a_hurry_a_creeping_picture_is_followed_row_by_row() {
         for (a, b) in first.iter().zip(&now) {
             assert!((a - b).abs() < 0.3, "{a} {b}");
         }
-        rebuilt += (built.iter().zip(&*tracker.storage.tables))
+        rebuilt += (built.iter().zip(&*tracker.store.buffers().tables))
             .filter(|(a, b)| a != b)
             .count();
-        built.copy_from_slice(tracker.storage.tables);
+        built.copy_from_slice(tracker.store.buffers().tables);
     }
-    assert!(tracker.follow.anchor_px() >= 3.0);
+    assert!(tracker.store.anchor_px() >= 3.0);
     assert!(rebuilt > 10, "{rebuilt} rows");
 }
 

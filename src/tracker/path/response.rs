@@ -5,7 +5,7 @@ use crate::{
     camera::pixel::Pixel,
     reference::RowTable,
     reference::align::between,
-    tracker::{RowLearning, Stage, Tracker, correlate::part, overlap::Overlap},
+    tracker::{RowLearning, Stage, Tracker, overlap::Overlap},
 };
 
 /// The row's phase-correlation function at whole steps from −SHARP to SHARP, as a line exposed in no time would meet it,
@@ -69,7 +69,7 @@ impl Tracker<'_> {
         let at = row as u16 as f32;
         let refining = self.stage == Stage::Refining;
         let frames = self.paths.frames;
-        let learning = self.storage.learning.get(row);
+        let learning = self.store.learning(row);
         let own_px = learning.map_or(0.0, |l| self.own_px(l));
         let motion = self
             .paths
@@ -82,15 +82,13 @@ impl Tracker<'_> {
             }
             self.correlate_along(row, table, pixels, shift_px, path)
         });
-        if let (true, Some(path), Some(learning)) =
-            (refining, path, self.storage.learning.get_mut(row))
-        {
+        if let (true, Some(path), Some(learning)) = (refining, path, self.store.learning_mut(row)) {
             let px2 = path.iter().map(|s| s * s).sum::<f32>() / SAMPLES as f32;
             learning.add_smear(px2);
         }
         let shift_px = unsmeared.unwrap_or(shift_px);
         self.note_oscillation(row, shift_px - own_px, information);
-        if let Some(learning) = self.storage.learning.get_mut(row) {
+        if let Some(learning) = self.store.learning_mut(row) {
             learning.shift_px += (shift_px - learning.shift_px) / frames.max(1.0);
         }
         shift_px
@@ -112,11 +110,7 @@ impl Tracker<'_> {
     /// A frame begins; where a swift picture will be, the rows of the one before tell.
     pub(in crate::tracker) fn look_ahead(&mut self) {
         if let (true, Some(px)) = (self.stage != Stage::Rough, self.paths.ahead.foreseen_px()) {
-            let own_px = self
-                .storage
-                .learning
-                .first()
-                .map_or(0.0, |l| self.own_px(l));
+            let own_px = self.store.learning(0).map_or(0.0, |l| self.own_px(l));
             self.prediction.foresee(px + own_px);
         }
     }
@@ -144,9 +138,13 @@ impl Tracker<'_> {
         let mut q = self.correlation_function(row, width)?;
         self.paths.note_repetition(&q);
         if self.stage == Stage::Tracking {
-            table.drop_own_noise(&mut q, self.recipe.level, self.recipe.stride);
+            table.drop_own_noise(
+                &mut q,
+                self.store.recipe().level,
+                self.store.recipe().stride,
+            );
         }
-        let own_px2 = self.storage.learning.get(row).and_then(|l| l.smear_px2());
+        let own_px2 = self.store.learning(row).and_then(|l| l.smear_px2());
         let step = 1.0 / stride;
         let response = Response {
             q: self.paths.sharpened(&q, own_px2),
@@ -160,14 +158,14 @@ impl Tracker<'_> {
 
     /// q at whole steps: what the row's own reference answers, moved by so many.
     fn correlation_function(&self, row: usize, width: usize) -> Option<[f32; 2 * LAGS + 1]> {
-        let coefficients = part(self.storage.coefficients, row, width)?;
-        let mean = part(self.storage.mean, row, width)?;
+        let coefficients = self.store.coefficients(row)?;
+        let mean = self.store.mean(row)?;
         if self.config.kernel.keeps_pairs() {
             return None;
         }
         let sum: u32 = mean.iter().map(|&c| u32::from(c)).sum();
         let level = sum as f32 / width as f32;
-        let value = 1.0 / self.recipe.counts_per_value;
+        let value = 1.0 / self.store.recipe().counts_per_value;
         let mut q = [0.0; 2 * LAGS + 1];
         for (at, q) in (0i32..).zip(&mut q) {
             let by = (LAGS as i32 - at) * i32::from(self.config.stride);

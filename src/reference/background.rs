@@ -4,17 +4,12 @@
 //! some columns in the background of each line, while the old coefficients still serve; a whole reference is moved one
 //! row after the other, some columns in the background of each line.
 
-use super::{RowLearning, Stage, Tracker};
-use crate::{
-    camera::pixel::Pixel,
-    kernel::Kernel,
-    reference::align::Averaging,
-    reference::{Build, Parts, RowTable, settle},
-};
+use super::{Build, Parts, RowTable, Store, align::Averaging, build::settle};
+use crate::{camera::pixel::Pixel, kernel::Kernel};
 
 /// What following remembers.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Follow {
+pub(super) struct Background {
     /// What is under way; no more than one thing is.
     work: Work,
     /// Where the picture is on average, px: a mean over some seconds.
@@ -88,29 +83,6 @@ const FRAMES_A_ROW_IN_A_HURRY: u32 = 32;
 /// The reference forgets over so many turns of a row: its noise is then that of twice as many frames.
 const MEMORY_FRAMES: u16 = 16;
 
-impl Follow {
-    #[inline(always)]
-    pub(super) fn anchor_px(&self) -> f32 {
-        self.anchor_px
-    }
-
-    pub(super) fn is_busy(&self) -> bool {
-        !matches!(self.work, Work::Nothing)
-    }
-
-    pub(super) fn is_moving(&self) -> bool {
-        matches!(self.work, Work::Move { .. })
-    }
-
-    /// By how much the reference of `row` lies to the left of where the other rows' lies, px.
-    pub(super) fn aside_px(&self, row: usize) -> f32 {
-        match self.work {
-            Work::Move { by_px, next, .. } if row >= next => by_px as f32,
-            _ => 0.0,
-        }
-    }
-}
-
 /// Columns at either end of a row that have no coefficients, whatever its band; what is moved further in comes in as 0.
 const ENDS: usize = 4;
 
@@ -127,11 +99,36 @@ const DRIFT_FRAMES: f32 = 128.0;
 /// by so few pixels loses none of them.
 const CREEP_PX: f32 = 1.5;
 
-impl Tracker<'_> {
-    /// The row whose turn it is in this frame; rows far apart follow each other.
-    pub(super) fn turn_of(&self, frame: u32) -> usize {
-        let free = self.stage == Stage::Tracking && !self.follow.is_busy();
-        let frames = match self.is_hurried() {
+impl Store<'_> {
+    /// By how much the reference was moved after a creeping picture, px.
+    #[inline(always)]
+    pub(crate) fn anchor_px(&self) -> f32 {
+        self.background.anchor_px
+    }
+
+    /// The background job is under way.
+    #[inline]
+    pub(crate) fn is_busy(&self) -> bool {
+        !matches!(self.background.work, Work::Nothing)
+    }
+
+    /// The background job moves the whole reference.
+    pub(crate) fn is_moving(&self) -> bool {
+        matches!(self.background.work, Work::Move { .. })
+    }
+
+    /// By how much the reference of `row` lies to the left of where the other rows' lies, px.
+    pub(crate) fn aside_px(&self, row: usize) -> f32 {
+        match self.background.work {
+            Work::Move { by_px, next, .. } if row >= next => by_px as f32,
+            _ => 0.0,
+        }
+    }
+
+    /// The row whose turn it is in this frame; rows far apart follow each other. `hurried`: a line time is short.
+    pub(crate) fn turn_of(&self, frame: u32, hurried: bool) -> usize {
+        let free = !self.is_busy();
+        let frames = match hurried {
             true => FRAMES_A_ROW_IN_A_HURRY,
             false => FRAMES_A_ROW,
         };
@@ -139,21 +136,28 @@ impl Tracker<'_> {
             return usize::MAX;
         }
         // 619 is prime: every row has its turn.
-        (frame / frames).wrapping_mul(619) as usize % usize::from(self.config.rows)
+        (frame / frames).wrapping_mul(619) as usize % self.rows()
     }
 
     /// The reference of a row that was checked and fitted is to take a little of it.
-    pub(super) fn follow_row<P: Pixel>(&mut self, row: usize, pixels: &[P], shift_px: f32) {
-        if self.follow.is_busy() {
+    pub(crate) fn follow_row<P: Pixel>(
+        &mut self,
+        row: usize,
+        pixels: &[P],
+        shift_px: f32,
+        to_reference: f32,
+        hurried: bool,
+    ) {
+        if self.is_busy() {
             return;
         }
-        P::pack(pixels, self.storage.scratch);
-        self.follow.work = Work::Kept {
+        P::pack(pixels, self.buffers.scratch);
+        self.background.work = Work::Kept {
             row,
             shift_px,
-            to_reference: self.to_reference,
+            to_reference,
         };
-        if !self.is_hurried() {
+        if !hurried {
             self.begin_average();
         }
     }
@@ -164,15 +168,12 @@ impl Tracker<'_> {
             row,
             shift_px,
             to_reference,
-        } = self.follow.work
+        } = self.background.work
         else {
             return;
         };
-        let now = core::mem::replace(&mut self.to_reference, to_reference);
-        let width = usize::from(self.config.width);
-        let averaging = self.averaging(row, width, shift_px, MEMORY_FRAMES);
-        self.to_reference = now;
-        self.follow.work = averaging.map_or(Work::Nothing, |averaging| Work::Average {
+        let averaging = self.averaging(row, shift_px, to_reference, MEMORY_FRAMES);
+        self.background.work = averaging.map_or(Work::Nothing, |averaging| Work::Average {
             row,
             averaging,
             column: 0,
@@ -181,11 +182,11 @@ impl Tracker<'_> {
 
     /// Goes on with what is under way, some columns or one row a line. Returns by how much the reference of
     /// `row` lies to the left of where the other rows' lies, px.
-    pub(super) fn follow_one_step<P: Pixel>(&mut self, row: usize, columns: u16) -> f32 {
-        let width = usize::from(self.config.width);
+    pub(crate) fn advance_background<P: Pixel>(&mut self, row: usize, columns: u16) -> f32 {
+        let width = self.width;
         let columns = usize::from(columns).max(1);
-        let s = &mut self.storage;
-        match &mut self.follow.work {
+        let s = &mut self.buffers;
+        match &mut self.background.work {
             Work::Nothing => {}
             Work::Kept { .. } => self.begin_average(),
             Work::Average {
@@ -196,7 +197,7 @@ impl Tracker<'_> {
                 let row = *row;
                 if *column == width {
                     let build = self.build_of(row);
-                    self.follow.work = Work::Build { row, build };
+                    self.background.work = Work::Build { row, build };
                     return 0.0;
                 }
                 // Many pixels go into one.
@@ -210,7 +211,7 @@ impl Tracker<'_> {
             Work::Build { row, build } => {
                 let span = *row * width..(*row + 1) * width;
                 let Some(mean) = s.mean.get(span.clone()) else {
-                    self.follow.work = Work::Nothing;
+                    self.background.work = Work::Nothing;
                     return 0.0;
                 };
                 let parts = &mut Parts {
@@ -220,7 +221,7 @@ impl Tracker<'_> {
                     coefficients: s.fresh,
                 };
                 if let Some(table) = build.advance(columns, parts) {
-                    self.follow.work = Work::Keep {
+                    self.background.work = Work::Keep {
                         row: *row,
                         table,
                         column: 0,
@@ -228,7 +229,7 @@ impl Tracker<'_> {
                 }
             }
             Work::Keep { row, table, column } => {
-                let kernel = self.config.kernel;
+                let kernel = self.recipe.kernel;
                 // Two by two.
                 let columns = columns.saturating_mul(2);
                 let span = *column..column.saturating_add(columns).min(width);
@@ -242,12 +243,12 @@ impl Tracker<'_> {
                         coefficients.copy_from_slice(s.fresh);
                         *slot = *table;
                     }
-                    self.follow.work = Work::Nothing;
+                    self.background.work = Work::Nothing;
                 }
             }
             Work::Move { .. } => {
                 self.move_one_step(row, columns);
-                return self.follow.aside_px(row);
+                return self.aside_px(row);
             }
         }
         0.0
@@ -260,19 +261,20 @@ impl Tracker<'_> {
             by_px,
             next,
             moving,
-        } = &mut self.follow.work
+        } = &mut self.background.work
         else {
             return;
         };
-        let (kernel, width) = (self.config.kernel, usize::from(self.config.width));
+        let (kernel, width) = (self.recipe.kernel, self.width);
+        let rows = self.buffers.tables.len();
         let row = *next * width..(*next + 1) * width;
-        let s = &mut self.storage;
+        let s = &mut self.buffers;
         let (Some(mean), Some(coefficients), Some(table)) = (
             s.mean.get_mut(row.clone()),
             s.coefficients.get_mut(row),
             s.tables.get_mut(*next),
         ) else {
-            self.follow.work = Work::Nothing;
+            self.background.work = Work::Nothing;
             return;
         };
         let at_once = columns >= width;
@@ -318,7 +320,6 @@ impl Tracker<'_> {
                 Moving::Mean { moved } => {
                     let steps = width.div_ceil(MEAN_COLUMNS);
                     // It is to be done before its own line comes.
-                    let rows = usize::from(self.config.rows);
                     let ahead = (*next + rows).saturating_sub(during) % rows;
                     if *moved == 0 && ahead <= steps + 2 && rows > 2 * steps {
                         return;
@@ -336,8 +337,8 @@ impl Tracker<'_> {
                     }
                     *next += 1;
                     *moving = Moving::BEGIN;
-                    if *next >= usize::from(self.config.rows) {
-                        self.follow.work = Work::Nothing;
+                    if *next >= self.rows() {
+                        self.background.work = Work::Nothing;
                     }
                     return;
                 }
@@ -348,55 +349,26 @@ impl Tracker<'_> {
         }
     }
 
-    fn build_of(&self, row: usize) -> Build {
-        let learning = self.storage.learning.get(row);
-        let frames = learning.map_or(1, RowLearning::frames);
-        Build::new(&self.recipe, f32::from(frames))
-    }
-
-    /// Builds a row's coefficients from its mean, in one go.
-    pub(super) fn build(&mut self, row: usize) {
-        let build = self.build_of(row);
-        let width = usize::from(self.config.width);
-        let span = row * width..(row + 1) * width;
-        let s = &mut self.storage;
-        if let (Some(mean), Some(coefficients), Some(slot)) = (
-            s.mean.get(span.clone()),
-            s.coefficients.get_mut(span),
-            s.tables.get_mut(row),
-        ) {
-            let table = build.all(&mut Parts {
-                mean,
-                mask: s.mask,
-                scratch: s.scratch,
-                coefficients,
-            });
-            self.config.kernel.keep_some(coefficients, 0..width);
-            *slot = table;
+    /// Once a frame: has the whole reference moved by whole pixels after a picture that creeps. `here_px`: where it
+    /// is at the frame's start. Returns by how much the reference is going to be moved, where it is.
+    pub(crate) fn follow_drift(&mut self, here_px: f32) -> Option<f32> {
+        let moving = self.is_moving();
+        let background = &mut self.background;
+        background.drift_px += (here_px - background.drift_px) / DRIFT_FRAMES;
+        if background.drift_px.abs() < CREEP_PX || moving {
+            return None;
         }
-    }
-
-    /// Once a frame: has the whole reference moved by whole pixels after a picture that creeps.
-    pub(super) fn follow_drift(&mut self) {
-        if !self.prediction.is_sure() || self.stage != Stage::Tracking {
-            return;
-        }
-        let here = self.prediction.at(0);
-        self.follow.drift_px += (here - self.follow.drift_px) / DRIFT_FRAMES;
-        if self.follow.drift_px.abs() < CREEP_PX || self.follow.is_moving() {
-            return;
-        }
-        let stride = i32::from(self.config.stride);
-        let by_px = stride * if self.follow.drift_px > 0.0 { 1 } else { -1 };
+        let stride = self.recipe.stride as i32;
+        let by_px = stride * if background.drift_px > 0.0 { 1 } else { -1 };
         // A row that is being followed will have another turn.
-        self.follow.work = Work::Move {
+        background.work = Work::Move {
             by_px,
             next: 0,
             moving: Moving::BEGIN,
         };
-        self.follow.anchor_px += by_px as f32;
-        self.follow.drift_px -= by_px as f32;
-        self.prediction.move_by(-by_px as f32);
+        background.anchor_px += by_px as f32;
+        background.drift_px -= by_px as f32;
+        Some(by_px as f32)
     }
 }
 
@@ -417,7 +389,7 @@ fn settle_ends(kernel: Kernel, row: &mut [i8]) -> bool {
 }
 
 /// Moves a row to the right by `by` (to the left where negative); what comes in repeats the edge.
-pub(super) fn move_row<T: Copy>(row: &mut [T], by: i32) {
+fn move_row<T: Copy>(row: &mut [T], by: i32) {
     let n = (by.unsigned_abs() as usize).min(row.len());
     let edge = if by > 0 { row.first() } else { row.last() };
     let Some(&edge) = edge else { return };

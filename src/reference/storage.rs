@@ -1,7 +1,17 @@
 //! The memory that a tracker is lent.
 
-use super::{ColumnLearning, ConfigError, RowLearning};
-use crate::reference::RowTable;
+use super::{ColumnLearning, RowLearning, RowTable};
+
+/// A buffer of [`Storage`] that holds less than the picture needs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct BufferTooShort {
+    /// The field's name.
+    pub(crate) name: &'static str,
+    /// Number of elements that it has.
+    pub(crate) has: usize,
+    /// Number of elements that are needed.
+    pub(crate) needs: usize,
+}
 
 /// Memory of a tracker, lent by the caller: 3·width + 24 bytes a row, and 16 bytes a column. The line
 /// path itself reads width + 16 bytes a row.
@@ -29,7 +39,7 @@ pub struct Storage<'a> {
 
 impl Storage<'_> {
     /// Cuts each buffer to what a picture of this size needs.
-    pub(super) fn cut(self, width: usize, rows: usize) -> Result<Self, ConfigError> {
+    pub(crate) fn cut(self, width: usize, rows: usize) -> Result<Self, BufferTooShort> {
         let pixels = width * rows;
         Ok(Self {
             coefficients: cut("coefficients", self.coefficients, pixels)?,
@@ -48,11 +58,11 @@ fn cut<'a, T>(
     name: &'static str,
     buffer: &'a mut [T],
     needs: usize,
-) -> Result<&'a mut [T], ConfigError> {
+) -> Result<&'a mut [T], BufferTooShort> {
     let has = buffer.len();
     buffer
         .get_mut(..needs)
-        .ok_or(ConfigError::Buffer { name, has, needs })
+        .ok_or(BufferTooShort { name, has, needs })
 }
 
 /// Arrays of fixed size for [`Storage`]: a `static` on a microcontroller, a local in a test.
