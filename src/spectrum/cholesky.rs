@@ -1,7 +1,11 @@
 //! The small positive definite system of the joint fit, solved in place.
 
-/// Largest system, unknowns.
-pub(crate) const MOST: usize = 56;
+/// Largest system, unknowns: sixteen rigid tones and the shapes of a few, more where memory is cheap.
+pub(crate) const MOST: usize = if cfg!(feature = "grid-32768") {
+    160
+} else {
+    64
+};
 
 /// Entries of the packed lower triangle of the largest system.
 pub(crate) const PACKED: usize = MOST * (MOST + 1) / 2;
@@ -35,10 +39,10 @@ impl Normal {
         self.packed[..used].fill(0.0);
     }
 
-    /// Sets row `i`, column `j ≤ i`; outside the matrix nothing happens.
-    pub(crate) fn set(&mut self, i: usize, j: usize, value: f32) {
+    /// Adds to row `i`, column `j ≤ i`; outside the matrix nothing happens.
+    pub(crate) fn add(&mut self, i: usize, j: usize, value: f32) {
         if i < self.unknowns && j <= i {
-            self.packed[at(i, j)] = value;
+            self.packed[at(i, j)] += value;
         }
     }
 
@@ -135,7 +139,7 @@ mod tests {
         let a = [[4.0, 1.0, 0.5], [1.0, 3.0, -1.0], [0.5, -1.0, 200.0]];
         for (i, row) in a.iter().enumerate() {
             for (j, &v) in row.iter().enumerate().take(i + 1) {
-                normal.set(i, j, v);
+                normal.add(i, j, v);
             }
         }
         normal.factor();
@@ -155,7 +159,7 @@ mod tests {
         let mut normal = Normal::new();
         normal.clear(2);
         for (i, j) in [(0, 0), (1, 0), (1, 1)] {
-            normal.set(i, j, 1.0);
+            normal.add(i, j, 1.0);
         }
         normal.factor();
         let mut b = [0.0; MOST];

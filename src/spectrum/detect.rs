@@ -206,10 +206,10 @@ fn spread(samples: &mut Samples<'_>, model: &Model, points: &mut [f32], g: Grid)
     let middle = 0.5 * g.points as f32;
     let last = g.points - 2;
     for slot in 0..samples.slots {
-        if samples.slot_weight[slot] <= 0.0 {
+        if samples.series_weight[slot] <= 0.0 {
             continue;
         }
-        samples.residual(slot, &model.tones, model.drift);
+        samples.residual(slot, &model.tones, &model.drift);
         let t = samples.slot_t[slot];
         for (&x, &frame_t) in samples
             .row

@@ -202,6 +202,10 @@ fn view<'s>(
     let (frame_t, frame_weight, scratch, row_t, own_re, own_im) =
         (row(), row(), row(), row(), row(), row());
     let (slot_t, rest) = storage.slot_rows.split_at_mut(slots);
+    let (series_weight, rest) = rest.split_at_mut(2 * slots);
+    let (slot_eta, rest) = rest.split_at_mut(slots);
+    let (coupling, rest) = rest.split_at_mut(slots);
+    let (score_re, score_im) = rest.split_at_mut(2 * slots);
     let half = storage.frame_phasors.len() / 2;
     let (frame_re, frame_im) = storage.frame_phasors.split_at_mut(half);
     let half = storage.slot_phasors.len() / 2;
@@ -213,6 +217,7 @@ fn view<'s>(
     let samples = Samples {
         frames,
         slots,
+        channels: 1,
         shift_px: storage.samples.shift_px,
         weight: storage.samples.weight,
         skew: storage.samples.skew,
@@ -222,7 +227,11 @@ fn view<'s>(
         frame_weight,
         slot_ns: storage.slot_ns,
         slot_t,
-        slot_weight: &mut rest[..slots],
+        slot_eta,
+        coupling,
+        series_weight,
+        score_re,
+        score_im,
         spread: storage.samples.spread,
         even: group.even_spread(),
         frame_re,

@@ -3,8 +3,10 @@
 use num_complex::Complex32 as Complex;
 
 use super::cholesky::{MOST, Normal};
-use super::gram::{Regressors, Unknown};
-use super::model::{Moments, POWERS, Samples, Tone};
+use super::gram::{Regressor, Regressors, Unknown};
+use super::model::{Drift, Moments, NO_MOMENTS, POWERS, Samples};
+use super::shape::{BASIS, CONSTANTS};
+use super::tone::Tone;
 use crate::report::MAX_PEAKS;
 
 /// Furthest a frequency may move in one step, turns a window length.
@@ -23,8 +25,7 @@ const SOON: f32 = 1000.0;
 #[derive(Clone, Debug)]
 pub(crate) struct Model {
     pub(crate) tones: heapless::Vec<Tone, MAX_PEAKS>,
-    /// Slow drift: px a window length, px a window length squared.
-    pub(crate) drift: [f32; 2],
+    pub(crate) drift: Drift,
     /// How many powers of t the drift has, 0 to 2.
     pub(crate) drift_powers: usize,
     /// Weighted sum of squares of what is left.
@@ -35,9 +36,16 @@ impl Model {
     pub(crate) const fn new(drift_powers: usize) -> Self {
         Self {
             tones: heapless::Vec::new(),
-            drift: [0.0; 2],
+            drift: [[0.0; 2]; 2],
             drift_powers,
             squares: 0.0,
+        }
+    }
+
+    /// Fills the phasor tables.
+    pub(crate) fn tabulate(&self, samples: &mut Samples<'_>) {
+        for (i, tone) in self.tones.iter().enumerate() {
+            samples.tabulate(i + 1, tone);
         }
     }
 }
@@ -63,7 +71,7 @@ impl Fit {
     pub(crate) const fn new() -> Self {
         Self {
             normal: Normal::new(),
-            moments: [[Complex::new(0.0, 0.0); POWERS]; MAX_PEAKS],
+            moments: [NO_MOMENTS; MAX_PEAKS],
             unknowns: [0.0; MOST],
             passes: 0,
         }
@@ -71,30 +79,29 @@ impl Fit {
 
     /// Degrees of freedom of the residual.
     pub(crate) fn freedom(samples: &Samples<'_>, model: &Model) -> f32 {
-        let slots = samples.slot_weight[..samples.slots]
+        let offsets = samples.series_weight[..samples.series()]
             .iter()
             .filter(|&&w| w > 0.0)
             .count();
         let fitted: usize = model
             .tones
             .iter()
-            .map(|t| if t.modulated { 5 } else { 3 })
+            .map(|t| 2 * t.shape.count() + if t.modulated { 3 } else { 1 })
             .sum();
-        samples.count as f32 - (slots + model.drift_powers + fitted) as f32
+        let drift = samples.channels * model.drift_powers;
+        samples.count as f32 - (offsets + drift + fitted) as f32
     }
 
     /// How much of the residual of the last pass is at tone `i` (squared).
     pub(crate) fn held(&self, i: usize) -> f32 {
-        self.moments.get(i).map_or(0.0, |m| m[0].norm_sqr())
+        self.moments.get(i).map_or(0.0, |m| m[0][0].norm_sqr())
     }
 
     /// The residual of `model` and its moments.
-    pub(crate) fn evaluate(&mut self, samples: &mut Samples<'_>, model: &mut Model) -> [f32; 2] {
-        for (i, tone) in model.tones.iter().enumerate() {
-            samples.tabulate(i + 1, tone);
-        }
+    pub(crate) fn evaluate(&mut self, samples: &mut Samples<'_>, model: &mut Model) -> Drift {
+        model.tabulate(samples);
         self.passes = self.passes.saturating_add(1);
-        let (squares, slow) = samples.pass(&model.tones, model.drift, &mut self.moments);
+        let (squares, slow) = samples.pass(&model.tones, &model.drift, &mut self.moments);
         model.squares = squares;
         slow
     }
@@ -119,21 +126,21 @@ impl Fit {
                     self.evaluate(samples, model);
                     return;
                 }
-                let regressors = Regressors::of(&model.tones, model.drift_powers);
+                let regressors = Regressors::of(&model.tones, model.drift_powers, samples.channels);
                 self.apply(model, &regressors, shorter, samples.length_s);
                 continue;
             }
             if step == steps {
                 return;
             }
-            let regressors = Regressors::of(&model.tones, model.drift_powers);
-            let settled = !model.tones.iter().any(|t| t.amplitude.norm_sqr() == 0.0);
+            let regressors = Regressors::of(&model.tones, model.drift_powers, samples.channels);
+            let settled = !model.tones.iter().any(|t| t.shape.is_zero());
             // Near the end the matrix hardly changes: it serves as long as each step gains much less than the one before.
             if !current {
                 samples.normal(&regressors, &model.tones, &mut self.normal);
                 self.normal.factor();
             }
-            let gradient = self.gradient(&regressors, slow);
+            let gradient = self.gradient(&regressors, &model.tones, &slow);
             self.unknowns = gradient;
             self.normal.solve(&mut self.unknowns);
             let gain: f32 = gradient
@@ -161,13 +168,23 @@ impl Fit {
         }
     }
 
-    fn gradient(&self, regressors: &Regressors, slow: [f32; 2]) -> [f32; MOST] {
+    fn gradient(&self, regressors: &Regressors, tones: &[Tone], slow: &Drift) -> [f32; MOST] {
         let mut gradient = [0.0; MOST];
         for (g, (r, _)) in gradient.iter_mut().zip(regressors.list()) {
             let power = usize::from(r.power);
-            *g = match usize::from(r.table) {
-                0 => slow[(power.max(1) - 1).min(1)],
-                k => (r.factor.conj() * self.moments[k - 1][power.min(POWERS - 1)]).re,
+            let Some(i) = usize::from(r.table).checked_sub(1) else {
+                *g = slow[axis_of(r)][(power.max(1) - 1).min(1)];
+                continue;
+            };
+            let moments = self.moments.get(i).unwrap_or(&NO_MOMENTS);
+            let product = |j: usize| {
+                let share = r.share(tones.get(i), j);
+                (share.conj() * moments[j][power.min(POWERS - 1)]).re
+            };
+            *g = match (r.column, tones.get(i)) {
+                (Some(column), _) => product(usize::from(column)),
+                (None, Some(tone)) => tone.shape.fitted().map(product).sum(),
+                (None, None) => 0.0,
             };
         }
         gradient
@@ -177,16 +194,17 @@ impl Fit {
         for ((r, unknown), &value) in regressors.list().iter().zip(&self.unknowns) {
             let change = share * value;
             if r.table == 0 {
-                model.drift[(usize::from(r.power).max(1) - 1).min(1)] += change;
+                model.drift[axis_of(r)][(usize::from(r.power).max(1) - 1).min(1)] += change;
                 continue;
             }
             let Some(tone) = model.tones.get_mut(usize::from(r.table) - 1) else {
                 continue;
             };
+            let column = usize::from(r.column.unwrap_or(0));
             match unknown {
                 Unknown::Drift => {}
-                Unknown::Re => tone.amplitude.re += change,
-                Unknown::Im => tone.amplitude.im += change,
+                Unknown::Re => tone.shape.change(column, |c| c.re += change),
+                Unknown::Im => tone.shape.change(column, |c| c.im += change),
                 Unknown::Frequency => {
                     let turns = change.clamp(-LONGEST_STEP, LONGEST_STEP);
                     tone.frequency = tone.frequency.plus(turns / length_s);
@@ -201,38 +219,28 @@ impl Fit {
 
     /// Prepares [`Fit::deviation`]; leaves the tables at `model`.
     pub(crate) fn weigh(&mut self, samples: &mut Samples<'_>, model: &Model) -> Regressors {
-        for (i, tone) in model.tones.iter().enumerate() {
-            samples.tabulate(i + 1, tone);
-        }
-        let regressors = Regressors::of(&model.tones, model.drift_powers);
+        model.tabulate(samples);
+        let regressors = Regressors::of(&model.tones, model.drift_powers, samples.channels);
         samples.normal(&regressors, &model.tones, &mut self.normal);
         self.normal.factor();
         regressors
     }
 
-    /// Standard deviations of tone `i` for unit noise, after [`Fit::weigh`].
+    /// Standard deviations of tone `i` for unit noise, after [`Fit::weigh`]: of its frequency, and of the amplitude that is
+    /// the sum over its coefficients of Re(conj(direction)·c).
     pub(crate) fn deviation(
         &self,
         regressors: &Regressors,
-        model: &Model,
         i: usize,
         length_s: f32,
+        direction: &Direction,
     ) -> Deviation {
-        let amplitude = model
-            .tones
-            .get(i)
-            .map_or(Complex::new(1.0, 0.0), |t| t.amplitude);
-        let size = amplitude.norm_sqr();
-        let along = if size > 0.0 {
-            amplitude.unscale(crate::math::sqrtf(size))
-        } else {
-            Complex::new(1.0, 0.0)
-        };
         let (mut of_hz, mut of_amplitude) = ([0.0; MOST], [0.0; MOST]);
         for (j, (r, unknown)) in regressors.list().iter().enumerate() {
             if usize::from(r.table) != i + 1 {
                 continue;
             }
+            let along = direction[usize::from(r.column.unwrap_or(0)).min(BASIS - 1)];
             match unknown {
                 Unknown::Re => of_amplitude[j] = along.re,
                 Unknown::Im => of_amplitude[j] = along.im,
@@ -245,6 +253,27 @@ impl Fit {
             amplitude_px: crate::math::sqrtf(self.normal.variance(&of_amplitude)),
         }
     }
+}
+
+/// The axis that a regressor of the drift is along.
+fn axis_of(regressor: &Regressor) -> usize {
+    usize::from(usize::from(regressor.column.unwrap_or(0)) == CONSTANTS[1])
+}
+
+/// What an amplitude's change is in the changes of the coefficients.
+pub(crate) type Direction = [Complex; BASIS];
+
+/// Along the constant of a tone's motion along x.
+pub(crate) fn along_constant(tone: &Tone) -> Direction {
+    let mut direction = [Complex::new(0.0, 0.0); BASIS];
+    let c = tone.shape.coefficient(0);
+    let size = c.norm_sqr();
+    direction[0] = if size > 0.0 {
+        c.unscale(crate::math::sqrtf(size))
+    } else {
+        Complex::new(1.0, 0.0)
+    };
+    direction
 }
 
 /// How many powers of t the drift has: fewer where there are few frames.

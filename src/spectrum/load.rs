@@ -88,7 +88,8 @@ impl Loaded {
         let (frame_t, rest) = s.frame_rows.split_at_mut(frames);
         let frame_weight = &mut rest[..frames];
         let (slot_t, rest) = s.slot_rows.split_at_mut(slots);
-        let slot_weight = &mut rest[..slots];
+        let (slot_weight, rest) = rest.split_at_mut(2 * slots);
+        let slot_eta = &mut rest[..slots];
         frame_weight.fill(0.0);
         let unit = skew_unit_ns(group);
         let (mut late, mut total) = (0.0_f32, 0.0_f32);
@@ -119,6 +120,7 @@ impl Loaded {
             late += sum * s.slot_ns[slot] as f32;
             total += sum;
         }
+        spread_over_rows(slot_eta, &slot_weight[..slots], group);
         let middle = if total > 0.0 {
             (late / total) as i64
         } else {
@@ -168,5 +170,28 @@ impl Loaded {
                 .unsigned_abs()
                 < slack.unsigned_abs()
         });
+    }
+}
+
+/// A slot that knows less than this share of the mean does not count among the rows that know something.
+const KNOWS: f32 = 0.02;
+
+/// Where the slots' middles are from the first row that knows something, −1, to the last, 1.
+fn spread_over_rows(eta: &mut [f32], weight: &[f32], group: &Group) {
+    let slots = eta.len();
+    let mean = weight.iter().sum::<f32>() / slots.max(1) as f32;
+    let knows = |w: &f32| *w > KNOWS * mean;
+    let first = weight.iter().position(knows).unwrap_or(0);
+    let last = weight
+        .iter()
+        .rposition(knows)
+        .unwrap_or(slots.saturating_sub(1));
+    let rows = f32::from(group.rows_per_sample());
+    let begin = first as f32 * rows;
+    let end = last as f32 * rows + f32::from(group.rows_of(last as u16));
+    let half = (0.5 * (end - begin)).max(0.5);
+    for (slot, eta) in eta.iter_mut().enumerate() {
+        let middle = slot as f32 * rows + 0.5 * f32::from(group.rows_of(slot as u16));
+        *eta = ((middle - begin) / half - 1.0).clamp(-1.0, 1.0);
     }
 }

@@ -15,6 +15,7 @@
 )]
 
 mod alarm;
+mod alias;
 mod blur;
 mod cholesky;
 mod config;
@@ -24,14 +25,20 @@ mod fit;
 mod follow;
 mod fourier;
 mod gram;
+mod largest;
 mod load;
 mod model;
+mod order;
 mod phase;
 mod plan;
 mod rows;
 mod search;
+mod shape;
+mod small;
 mod smear;
+mod standing;
 mod storage;
+mod tone;
 mod tones;
 mod window;
 

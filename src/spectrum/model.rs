@@ -1,10 +1,15 @@
-//! Tones, their phasor tables, and the one pass over the samples that everything else is made of.
+//! The samples, the tones' phasor tables, and the one pass over the samples that everything else is made of.
+//!
+//! A *series* is one channel of one slot over the frames. Where the samples know one axis, a series is a slot. Where they know
+//! both there are twice as many: first those of the sums u + κ·v, then those of v alone, whose noise is independent.
 
 use num_complex::Complex32 as Complex;
 
 use super::blur::blur;
 use super::phase::Frequency;
 use super::rows;
+use super::shape::{BASIS, Coupling, Sight, legendre};
+use super::tone::Tone;
 use crate::math::{cos_sin, turns};
 use crate::report::MAX_PEAKS;
 use crate::timeline::Spread;
@@ -18,67 +23,26 @@ pub(crate) const POWERS: usize = 3;
 /// A sample is skewed where its time is off its frame's and slot's by more than this many steps.
 pub(crate) const NO_SKEW: u16 = 16;
 
-/// One sinusoid: Re(conj(amplitude) · e^(growth·t + 2πi(f·t + chirp·t²/2))), t in window lengths from the middle.
-///
-/// What was struck dies away so: a linear growth in place of e^(growth·t) leaves beside it what it does not follow, and
-/// where the blank time is long that has ghosts.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Tone {
-    pub(crate) frequency: Frequency,
-    /// px.
-    pub(crate) amplitude: Complex,
-    /// Turns per window length squared.
-    pub(crate) chirp: f32,
-    /// Relative change of amplitude, 1 a window length.
-    pub(crate) growth: f32,
-    /// `chirp` and `growth` are fitted.
-    pub(crate) modulated: bool,
-}
+/// Weighted inner products of the residual with t^p·e^(iωt) times each of the shape's polynomials, p from 0.
+pub(crate) type Moments = [[Complex; POWERS]; BASIS];
 
-impl Tone {
-    pub(crate) fn steady(frequency: Frequency) -> Self {
-        Self {
-            frequency,
-            amplitude: Complex::new(0.0, 0.0),
-            chirp: 0.0,
-            growth: 0.0,
-            modulated: false,
-        }
-    }
+/// No moments.
+pub(crate) const NO_MOMENTS: Moments = [[Complex::new(0.0, 0.0); POWERS]; BASIS];
 
-    /// How much larger it is at `t`.
-    #[inline(never)]
-    fn grown(&self, t: f32) -> f32 {
-        exp(self.growth * t)
-    }
-
-    /// Highest power of t among the regressors.
-    pub(crate) fn top_power(&self) -> usize {
-        if self.modulated { 2 } else { 1 }
-    }
-}
-
-/// e^x to 0.3 % for |x| up to 4, in a few multiplications: it is asked of every sample.
-fn exp(x: f32) -> f32 {
-    let y = x * (1.0 / 16.0);
-    let mut power = 1.0 + y * (1.0 + y * (0.5 + y * (1.0 / 6.0)));
-    for _ in 0..4 {
-        power *= power;
-    }
-    power
-}
-
-/// Weighted inner products of the residual with t^p·e^(iωt), p from 0.
-pub(crate) type Moments = [Complex; POWERS];
+/// Slow drift along x and along y: px a window length, px a window length squared.
+pub(crate) type Drift = [[f32; 2]; 2];
 
 /// The window as the passes see it: slices of one length a frame or a slot, tables of one row a tone.
 #[derive(Debug)]
 pub(crate) struct Samples<'a> {
     pub(crate) frames: usize,
     pub(crate) slots: usize,
-    /// Slot-major, `frames` a slot.
+    /// 1 where the samples know x alone, 2 where they know both axes.
+    pub(crate) channels: usize,
+    /// One series after the other, `frames` each.
     pub(crate) shift_px: &'a mut [f32],
     pub(crate) weight: &'a mut [u16],
+    /// One slot after the other: of both of its series.
     pub(crate) skew: &'a mut [i16],
     /// A step of the skew, ns; `None` where no sample is skewed.
     pub(crate) skew_ns: Option<f32>,
@@ -89,11 +53,19 @@ pub(crate) struct Samples<'a> {
     /// Time of a slot after its frame's mean, ns, and in window lengths.
     pub(crate) slot_ns: &'a mut [i64],
     pub(crate) slot_t: &'a mut [f32],
-    pub(crate) slot_weight: &'a mut [f32],
+    /// Where a slot is among the rows that know something, −1 to 1.
+    pub(crate) slot_eta: &'a [f32],
+    /// How much of a motion along y is in the first channel of a slot.
+    pub(crate) coupling: &'a [f32],
+    /// Sum of weights of each series.
+    pub(crate) series_weight: &'a mut [f32],
     /// How a slot's rows lie in time.
     pub(crate) spread: &'a [Spread],
     /// The same where all rows of a slot know the same: amplitudes are told as if all slots were so.
     pub(crate) even: Spread,
+    /// Scores of each series at a tone's alias frequency ([`Samples::score`]).
+    pub(crate) score_re: &'a mut [f32],
+    pub(crate) score_im: &'a mut [f32],
     /// Phasors, a row a tone.
     pub(crate) frame_re: &'a mut [f32],
     pub(crate) frame_im: &'a mut [f32],
@@ -123,17 +95,47 @@ impl Samples<'_> {
     /// Power that a periodogram has `hz`, a multiple of the frame rate, away from a tone, over the tone's own.
     pub(crate) fn ghost(&self, hz: f32) -> f32 {
         let frequency = Frequency::from_hz(hz);
-        let mut sum = Complex::new(0.0, 0.0);
+        let (mut sum, mut total) = (Complex::new(0.0, 0.0), 0.0);
         for (&ns, &w) in self
             .slot_ns
             .iter()
-            .zip(self.slot_weight.iter())
+            .zip(self.series_weight.iter())
             .take(self.slots)
         {
             let (re, im) = cos_sin(frequency.phase(ns));
             sum += Complex::new(re, im).scale(w);
+            total += w;
         }
-        sum.norm_sqr() / (self.total_weight * self.total_weight)
+        sum.norm_sqr() / (total * total).max(f32::MIN_POSITIVE)
+    }
+
+    /// Series of samples there are.
+    pub(crate) fn series(&self) -> usize {
+        self.channels * self.slots
+    }
+
+    /// What this series sees of a tone's shape.
+    pub(crate) fn sight(&self, series: usize) -> Sight {
+        let slot = series % self.slots.max(1);
+        let axes = (self.channels > 1).then(|| {
+            let whole = Coupling {
+                of_motion: 1.0,
+                of_speed_s: 0.0,
+            };
+            if series < self.slots {
+                let share = Coupling {
+                    of_motion: self.coupling[slot],
+                    of_speed_s: 0.0,
+                };
+                [whole, share]
+            } else {
+                [Coupling::default(), whole]
+            }
+        });
+        Sight {
+            polynomials: legendre(self.slot_eta[slot]),
+            axes,
+        }
     }
 
     /// Fills table row `k` for `tone`.
@@ -197,14 +199,19 @@ impl Samples<'_> {
         }
     }
 
-    /// Leaves the weighted residual of one slot, its mean removed, in `row`; returns its weighted sum of squares.
+    /// Leaves the weighted residual of one series, its mean removed, in `row`; returns its weighted sum of squares.
     ///
-    /// Removing the mean is the projection off the slot's unknown offset.
-    pub(crate) fn residual(&mut self, slot: usize, tones: &[Tone], drift: [f32; 2]) -> f32 {
+    /// Removing the mean is the projection off the series' unknown offset.
+    pub(crate) fn residual(&mut self, series: usize, tones: &[Tone], drift: &Drift) -> f32 {
         let n = self.frames;
-        let here = slot * n..slot * n + n;
+        let here = series * n..series * n + n;
+        let slot = series % self.slots.max(1);
+        let sight = self.sight(series);
         let at = self.slot_t[slot];
-        let (linear, square) = (drift[0] + 2.0 * drift[1] * at, drift[1]);
+        let along = |power: usize| {
+            drift[0][power] * sight.of_drift(0) + drift[1][power] * sight.of_drift(1)
+        };
+        let (linear, square) = (along(0) + 2.0 * along(1) * at, along(1));
         let shifts = &self.shift_px[here.clone()];
         rows::less_drift(
             &mut self.row[..n],
@@ -213,10 +220,11 @@ impl Samples<'_> {
             linear,
             square,
         );
-        let late = self.late(here.clone());
+        let late = self.late(slot * n..slot * n + n);
         for (i, tone) in tones.iter().enumerate().filter(|(_, t)| !t.modulated) {
             let k = i + 1;
-            let g = tone.amplitude * self.slot_phasor(k, slot).conj();
+            let hz = tone.frequency.hz();
+            let g = sight.seen(&tone.shape, hz) * self.slot_phasor(k, slot).conj();
             let phasors = (
                 &self.frame_re[k * n..k * n + n],
                 &self.frame_im[k * n..k * n + n],
@@ -225,7 +233,7 @@ impl Samples<'_> {
             match late {
                 None => rows::less_tone(row, phasors.0, phasors.1, g),
                 Some(step_ns) => {
-                    let turn = core::f32::consts::TAU * tone.frequency.hz() * 1e-9 * step_ns;
+                    let turn = core::f32::consts::TAU * hz * 1e-9 * step_ns;
                     rows::less_late_tone(row, phasors, &self.row_t[..n], turn, g);
                 }
             }
@@ -233,14 +241,14 @@ impl Samples<'_> {
         // These use `row_t` for their own times.
         for tone in tones.iter().filter(|t| t.modulated) {
             self.own_phasors(tone, slot);
-            let a = tone.amplitude;
+            let a = sight.seen(&tone.shape, tone.frequency.hz());
             for i in 0..n {
                 self.row[i] -= a.re * self.own_re[i] + a.im * self.own_im[i];
             }
         }
         let weight = &self.weight[here];
         let row = &mut self.row[..n];
-        let total = self.slot_weight[slot];
+        let total = self.series_weight[series];
         let mean = if total > 0.0 {
             rows::weighted_sum(weight, row) / total
         } else {
@@ -260,23 +268,25 @@ impl Samples<'_> {
         any.then_some(step_ns)
     }
 
-    /// One pass: the residual's weighted sum of squares, its products with the drift (t, t²) and the moments of
-    /// every tone.
+    /// One pass: the residual's weighted sum of squares, its products with the drift (t, t² along either axis) and the
+    /// moments of every tone.
     pub(crate) fn pass(
         &mut self,
         tones: &[Tone],
-        drift: [f32; 2],
+        drift: &Drift,
         moments: &mut [Moments; MAX_PEAKS],
-    ) -> (f32, [f32; 2]) {
+    ) -> (f32, Drift) {
         let n = self.frames;
         let mut squares = 0.0;
-        let mut slow = [0.0_f32; 2];
-        *moments = [[Complex::new(0.0, 0.0); POWERS]; MAX_PEAKS];
-        for slot in 0..self.slots {
-            if self.slot_weight[slot] <= 0.0 {
+        let mut slow = [[0.0_f32; 2]; 2];
+        moments[..tones.len().min(MAX_PEAKS)].fill(NO_MOMENTS);
+        for series in 0..self.series() {
+            if self.series_weight[series] <= 0.0 {
                 continue;
             }
-            squares += self.residual(slot, tones, drift);
+            let slot = series % self.slots;
+            let sight = self.sight(series);
+            squares += self.residual(series, tones, drift);
             let t = self.slot_t[slot];
             for (i, tone) in tones.iter().enumerate() {
                 if !tone.modulated {
@@ -291,15 +301,16 @@ impl Samples<'_> {
                     sums[1] += product.scale(at);
                     sums[2] += product.scale(at * at);
                 }
-                for (m, s) in moments[i].iter_mut().zip(sums) {
-                    *m += s;
-                }
+                add(&mut moments[i], tone, &sight, &sums);
             }
             let (row, row_t) = (&self.row[..n], &mut self.row_t[..n]);
             let (first, second) = rows::times(row, &self.frame_t[..n], row_t);
             let row_t = &self.row_t[..n];
-            slow[0] += first;
-            slow[1] += second + 2.0 * t * first;
+            for (axis, slow) in slow.iter_mut().enumerate() {
+                let share = sight.of_drift(axis);
+                slow[0] += share * first;
+                slow[1] += share * (second + 2.0 * t * first);
+            }
             for (i, tone) in tones.iter().enumerate() {
                 if tone.modulated {
                     continue;
@@ -309,11 +320,21 @@ impl Samples<'_> {
                 let im = &self.frame_im[k * n..k * n + n];
                 let q = self.slot_phasor(k, slot);
                 let (zero, one) = rows::products(row, row_t, re, im);
-                let m = &mut moments[i];
-                m[0] += q * zero;
-                m[1] += q * (one + zero.scale(t));
+                let sums = [q * zero, q * (one + zero.scale(t)), Complex::new(0.0, 0.0)];
+                add(&mut moments[i], tone, &sight, &sums);
             }
         }
         (squares, slow)
+    }
+}
+
+/// Adds what a series' sums are to the coefficients of the tone's shape.
+fn add(moments: &mut Moments, tone: &Tone, sight: &Sight, sums: &[Complex; POWERS]) {
+    let hz = tone.frequency.hz();
+    for j in tone.shape.fitted() {
+        let seen = sight.column(j, hz).conj();
+        for (m, s) in moments[j].iter_mut().zip(sums) {
+            *m += seen * s;
+        }
     }
 }

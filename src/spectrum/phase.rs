@@ -27,6 +27,11 @@ impl Frequency {
         Self(self.0.wrapping_add((hz * STEPS_PER_HZ) as i64))
     }
 
+    /// Its mirror image, as much below 0.
+    pub(crate) fn mirrored(self) -> Self {
+        Self(self.0.wrapping_neg())
+    }
+
     /// In Hz.
     pub(crate) fn hz(self) -> f32 {
         self.0 as f32 / STEPS_PER_HZ

@@ -1,12 +1,11 @@
 //! One more tone at a time, until the next is no more than noise would be.
 
-use num_complex::Complex32 as Complex;
-
 use super::alarm;
 use super::detect::{self, Band, Candidate};
-use super::fit::{Fit, Model, drift_powers};
-use super::model::{Samples, Tone};
+use super::fit::{Fit, Model, along_constant, drift_powers};
+use super::model::Samples;
 use super::phase::Frequency;
+use super::tone::Tone;
 
 /// Refinement steps of a trial and of the final fit.
 const STEPS: u32 = 12;
@@ -97,6 +96,7 @@ impl Search {
         // Each round adds, exchanges or drops a tone; the bound only guards against going round in circles.
         for _ in 0..3 * self.most_tones + 3 {
             if self.add(samples, fit, model, grid, &mut outcome) {
+                self.stand(samples, fit, model, model.tones.len().saturating_sub(1));
                 continue;
             }
             if self.tired(fit) {
@@ -104,7 +104,11 @@ impl Search {
             }
             let exchanged = self.exchange(samples, fit, model);
             let dropped = self.drop_weak(samples, fit, model);
-            if !exchanged && !dropped {
+            let mut stood = false;
+            for i in 0..model.tones.len() {
+                stood |= self.stand(samples, fit, model, i);
+            }
+            if !exchanged && !dropped && !stood {
                 break;
             }
         }
@@ -122,7 +126,7 @@ impl Search {
         for powers in 0..model.drift_powers {
             let mut trial = model.clone();
             trial.drift_powers = powers;
-            trial.drift = [0.0; 2];
+            trial.drift = [[0.0; 2]; 2];
             fit.refine(samples, &mut trial, STEPS);
             let worse = (trial.squares - model.squares) / model.squares * freedom;
             if worse < DRIFT_SEEN && self.sound(samples, &trial) {
@@ -134,7 +138,7 @@ impl Search {
     }
 
     /// The passes are used up, but for the last refinement.
-    fn tired(&self, fit: &Fit) -> bool {
+    pub(super) fn tired(&self, fit: &Fit) -> bool {
         fit.passes.saturating_add(STEPS) > self.most_passes
     }
 
@@ -342,9 +346,9 @@ impl Search {
         let (Some(old), Some(a)) = (model.tones.get(i), so_far.tones.get(i)) else {
             return false;
         };
-        let pa = a.amplitude.norm_sqr();
+        let pa = a.shape.power();
         let further = so_far.tones.get(model.tones.len());
-        let pb = further.map_or(0.0, |b| b.amplitude.norm_sqr());
+        let pb = further.map_or(0.0, |b| b.shape.power());
         let center = old
             .frequency
             .plus(pb / (pa + pb) * beside.above(a.frequency));
@@ -385,7 +389,7 @@ impl Search {
     }
 
     /// Every tone is within the band, not hidden, and apart from the others.
-    fn sound(&self, samples: &Samples<'_>, model: &Model) -> bool {
+    pub(super) fn sound(&self, samples: &Samples<'_>, model: &Model) -> bool {
         let length_s = samples.length_s;
         model.tones.iter().enumerate().all(|(i, tone)| {
             let hz = tone.frequency.hz();
@@ -412,7 +416,12 @@ impl Search {
         }
         let mut changed = false;
         for i in 0..model.tones.len() {
-            if self.tired(fit) || model.tones.get(i).is_none_or(|t| t.modulated) {
+            if self.tired(fit)
+                || model
+                    .tones
+                    .get(i)
+                    .is_none_or(|t| t.modulated || t.shape.count() > 1)
+            {
                 continue;
             }
             let ghosts = self.ghosts(samples, fit, model, i, fps);
@@ -447,7 +456,7 @@ impl Search {
             return ghosts;
         };
         let own = tone.frequency;
-        tone.amplitude = Complex::new(0.0, 0.0);
+        tone.shape.clear();
         tone.modulated = false;
         let first = probes.tones.len();
         for k in GHOSTS {
@@ -485,9 +494,9 @@ impl Search {
         let mut weakest: Option<(usize, f32)> = None;
         for (i, tone) in model.tones.iter().enumerate() {
             let sd = fit
-                .deviation(&regressors, model, i, samples.length_s)
+                .deviation(&regressors, i, samples.length_s, &along_constant(tone))
                 .amplitude_px;
-            let gain = tone.amplitude.norm_sqr() / (sd * sd);
+            let gain = tone.shape.power() / (sd * sd);
             if weakest.is_none_or(|(_, g)| gain < g) {
                 weakest = Some((i, gain));
             }

@@ -40,7 +40,7 @@ pub(crate) struct Correction {
 
 impl<'a> Smear<'a> {
     pub(crate) fn of(group: &'a Group, curvature: Curvature, model: &Model) -> Self {
-        let sizes = model.tones.iter().map(|t| t.amplitude.norm_sqr());
+        let sizes = model.tones.iter().map(|t| t.shape.power());
         let reach_px: f32 = sizes.map(crate::math::sqrtf).sum();
         Self {
             group,

@@ -13,8 +13,9 @@ pub(crate) const MAX_GRID: usize = if cfg!(feature = "grid-32768") {
     8192
 };
 
-/// Rows of [`EstimatorStorage::slot_rows`]: time and weight.
-pub(crate) const SLOT_ROWS: usize = 2;
+/// Rows of [`EstimatorStorage::slot_rows`]: time, two weights, place among the rows, coupling of the axes, and four of
+/// scratch.
+pub(crate) const SLOT_ROWS: usize = 9;
 
 /// What [`super::Estimator`] works in. F: frames a window, S: slots a frame.
 #[derive(Debug)]
@@ -27,7 +28,7 @@ pub struct EstimatorStorage<'a> {
     pub slot_ns: &'a mut [i64],
     /// 6·F.
     pub frame_rows: &'a mut [f32],
-    /// 2·S.
+    /// 9·S.
     pub slot_rows: &'a mut [f32],
     /// Phasors of tones at frames: 2·F·(tones + 1).
     pub frame_phasors: &'a mut [f32],

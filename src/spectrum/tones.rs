@@ -3,6 +3,7 @@
 use super::config::Config;
 use super::detect::Band;
 use super::fit::{Fit, Model};
+use super::largest::{direction, largest};
 use super::model::Samples;
 use super::smear::Smear;
 use crate::report::{MAX_PEAKS, Peak};
@@ -83,11 +84,13 @@ impl Telling<'_> {
             if !(low..=high).contains(&hz) || attenuation < LEAST_ATTENUATION {
                 continue;
             }
-            let amplitude = crate::math::sqrtf(tone.amplitude.norm_sqr());
-            let unit = fit.deviation(&regressors, model, i, samples.length_s);
+            let (eta, orbit) = largest(&tone.shape);
+            let amplitude = orbit.semi_major_px;
+            let along = direction(eta, &orbit);
+            let unit = fit.deviation(&regressors, i, samples.length_s, &along);
             // One that changes is no standing deformation, wherever it is.
             let kept = tone.modulated || samples.kept(&samples.frame_means(i + 1)) >= KEPT_ENOUGH;
-            let power = samples.total_weight * amplitude * amplitude / (4.0 * variance).max(1e-30);
+            let power = samples.total_weight * tone.shape.power() / (4.0 * variance).max(1e-30);
             let amplitude_px = amplitude / attenuation;
             let sd_px = noise * unit.amplitude_px / attenuation;
             let smeared = smear.correction(amplitude_px, hz);
@@ -98,7 +101,7 @@ impl Telling<'_> {
                 amplitude_px: amplitude_px * smeared.scale,
                 amplitude_px_sd: crate::math::sqrtf(sd_px * sd_px + doubt_px * doubt_px),
                 snr_db: 10.0 * libm::log10f(power.max(1e-9)),
-                ambiguous: self.near_multiple(hz, samples.length_s) || !kept,
+                ambiguous: self.near_multiple(hz, samples.length_s) || !kept || tone.unsure,
                 track: 0,
                 harmonic: None,
             };

@@ -1,0 +1,156 @@
+//! A tone strong enough to show it is given its shape over the rows, at the multiple of the frame rate where it stands.
+//!
+//! Weak tones are found under the rigid model, which is the most sensitive; a tone whose rows do not move alike is then found
+//! at any of its images. What the rows say at the alias frequency ([`super::alias`]) is one for all of them. A vibration's
+//! shape stands: it is real but for one phase. Of all multiples k that one is taken where the shape explains most with a
+//! standing shape.
+
+use super::alias::ShapeFit;
+use super::fit::{Fit, Model};
+use super::gram::Regressors;
+use super::model::Samples;
+use super::order::Grown;
+use super::phase::Frequency;
+use super::search::Search;
+use super::shape::ORDERS;
+
+/// Steps to refine with a shape.
+const STEPS: u32 = 12;
+
+/// Of what the shape gains over the rigid one, no more than this share is lost where it has to stand: else it travels, or
+/// two tones are there.
+const TRAVELS: f32 = 0.25;
+
+/// A loss of no more than this many noise variances is noise.
+const LOSS_BY_NOISE: f32 = 12.0;
+
+/// A multiple that explains this share of the best one's, and is no more noise variances behind than [`APART`], is not told
+/// from it.
+const ALIKE: f32 = 0.95;
+
+/// See [`ALIKE`].
+const APART: f32 = 50.0;
+
+/// What is this near to an image of a tone is at its alias frequency, turns a window length.
+const AS_IMAGE: f32 = 1.0;
+
+/// Fewest slots that tell of a shape.
+const FEWEST_SLOTS: usize = 4;
+
+/// A shape is kept where it lowers the sum of squares by so many noise variances.
+const WORTH: f32 = 16.0;
+
+/// A multiple of the frame rate and what stands there.
+#[derive(Clone, Copy, Debug)]
+struct Multiple {
+    at: Frequency,
+    value: f32,
+}
+
+impl Search {
+    /// Gives tone `i` a shape where its rows ask for one, perhaps at another multiple of the frame rate. Says whether `model`
+    /// has changed.
+    pub(crate) fn stand(
+        &self,
+        samples: &mut Samples<'_>,
+        fit: &mut Fit,
+        model: &mut Model,
+        i: usize,
+    ) -> bool {
+        let Some(tone) = model.tones.get(i).copied() else {
+            return false;
+        };
+        if tone.modulated || samples.knowing().len() < FEWEST_SLOTS || self.tired(fit) {
+            return false;
+        }
+        let variance = model.squares / Fit::freedom(samples, model).max(1.0);
+        model.tabulate(samples);
+        let scores = samples.score(model, i, |j| j == i);
+        fit.passes = fit.passes.saturating_add(1);
+        let axes = [true, samples.channels > 1];
+        let here = samples.grow(&scores, tone.frequency, axes, variance);
+        // At an image nothing low fits, and growth has to beat what is left: that alone would not tell.
+        if !here.residual.is_more_than_noise()
+            && here.fit.shape.orders().map(|o| o.max(1)) == tone.shape.orders().map(|o| o.max(1))
+        {
+            return false;
+        }
+        let all = samples.knowing();
+        let most = (all.len().saturating_sub(1) / 2 + 1).min(ORDERS);
+        let (mut best, mut second): (Option<Multiple>, Option<Multiple>) = (None, None);
+        for at in self.multiples(tone.frequency) {
+            let orders = axes.map(|moves| if moves { most } else { 0 });
+            let ShapeFit { gain, loss, .. } = samples.shape_at(&scores, at, orders, all.clone());
+            let value = gain - loss;
+            if best.is_none_or(|b| value > b.value) {
+                second = best;
+                best = Some(Multiple { at, value });
+            } else if second.is_none_or(|s| value > s.value) {
+                second = Some(Multiple { at, value });
+            }
+        }
+        let Some(best) = best else { return false };
+        let grown = samples.grow(&scores, best.at, axes, variance);
+        if !stands(&grown, variance)
+            || grown.fit.shape.orders() == tone.shape.orders() && best.at == tone.frequency
+        {
+            return false;
+        }
+        let unsure = second.is_some_and(|s| {
+            s.value > ALIKE * best.value && best.value - s.value < APART * variance
+        });
+        let mut trial = model.clone();
+        if let Some(tone) = trial.tones.get_mut(i) {
+            tone.shape = grown.fit.shape;
+            tone.frequency = best.at;
+            tone.unsure = unsure;
+            if best.at.hz() < 0.0 {
+                tone.frequency = best.at.mirrored();
+                tone.shape = tone.shape.conjugate();
+            }
+        }
+        if !Regressors::have_room(&trial.tones, samples.channels) {
+            return false;
+        }
+        fit.refine(samples, &mut trial, STEPS);
+        let better =
+            model.squares - trial.squares > WORTH * variance && self.sound(samples, &trial);
+        if better {
+            *model = trial;
+        }
+        better
+    }
+
+    /// All frequencies that frames cannot tell from this one, within the band; those of mirror images are negative.
+    fn multiples(&self, frequency: Frequency) -> impl Iterator<Item = Frequency> + use<> {
+        let (low, high) = (self.band.lowest_hz, self.band.highest_hz);
+        let fps = self.band.fps.unwrap_or(0.0);
+        let most = if fps > 0.0 {
+            ((high + frequency.hz()) / fps) as i32 + 1
+        } else {
+            0
+        };
+        (-most..=most).filter_map(move |k| {
+            let at = frequency.plus(k as f32 * fps);
+            (k == 0 || (low..=high).contains(&at.hz().abs())).then_some(at)
+        })
+    }
+
+    /// Whether `a` is at an image of `b`: a multiple of the frame rate from it or from its mirror image.
+    pub(crate) fn is_image(&self, samples: &Samples<'_>, a: Frequency, b: Frequency) -> bool {
+        let Some(fps) = self.band.fps else {
+            return false;
+        };
+        [a.above(b), a.hz() + b.hz()].iter().any(|apart| {
+            let away = apart - fps * libm::roundf(apart / fps);
+            away.abs() * samples.length_s < AS_IMAGE
+        })
+    }
+}
+
+/// The shape is real but for one phase along either axis, as far as noise lets it tell.
+fn stands(grown: &Grown, variance: f32) -> bool {
+    let bent = grown.fit.gain - grown.rigid_gain;
+    let limit = TRAVELS * bent;
+    grown.fit.loss < limit.max(LOSS_BY_NOISE * variance * grown.residual.each().max(1.0))
+}
