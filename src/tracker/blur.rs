@@ -13,7 +13,7 @@
 //! This is for boards. With the feature `long-exposure`, where lines need not be short, the whole path is taken
 //! (`path/`).
 
-use super::{Stage, Tracker};
+use super::{Stage, Tracker, correlate::nearest_product};
 use crate::{camera::Timing, camera::pixel::Pixel, reference::RowTable};
 
 /// Smears change a shift by less than this, px.
@@ -157,7 +157,8 @@ impl Tracker<'_> {
         shift_px: f32,
         smear: Smear,
     ) -> Option<f32> {
-        let (whole, product) = self.nearest_product(row, pixels, shift_px)?;
+        let (whole, product) = nearest_product(&self.store, row, pixels, shift_px)?;
+        let product = product * self.light.to_reference;
         let near = table.shift_of_smeared_px(product, smear.variance_px2, smear.skew_px3);
         let unsmeared_px = whole as f32 + near;
         // A correction beyond this is no correction: the expansion does not hold, or the speed is wrong.

@@ -1,13 +1,13 @@
 //! Where a line lies against its reference: inner products at whole shifts, and the row's polynomial between.
 
 use super::{
-    Tracker,
+    light::Light,
     overlap::{Overlap, nearest_step},
     row::Row,
 };
 use crate::{
     camera::pixel::Pixel,
-    reference::{RowTable, at_least_1},
+    reference::{RowTable, Store, at_least_1},
 };
 
 /// Why a line has no shift.
@@ -23,61 +23,88 @@ pub(super) enum Unfound {
 const TURNS: u8 = 6;
 const TURNS_IN_A_HURRY: u8 = 2;
 
+/// How far the row's polynomial is believed and what a line has taken so far.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Correlator {
+    /// A line that is expected nearer than this is read where its reference lies: half the pixels from one to the next of
+    /// the same colour, or `near_px` where a line time is short, as reading it elsewhere takes longer.
+    pub(super) here_px: f32,
+    /// [`NEAR_PX`] of those pixels.
+    pub(super) near_px: f32,
+    /// Inner products that this line has taken beyond the first where it had moved by whole pixels; a check counts as two.
+    pub(super) products: u8,
+}
+
+/// Σ h·p and Σ p of a line, where they were taken.
+pub(super) type Sums = Option<(f32, f32)>;
+
 /// Beyond this the row's polynomial is left for the next whole shift, px. While learning, a row of little but noise that is
 /// moved on too readily aligns its noise and takes it for texture.
 pub(super) const NEAR_PX: f32 = 0.55;
 pub(super) const NEAR_WHILE_LEARNING_PX: f32 = 0.7;
 
-impl Tracker<'_> {
-    /// Σ h·p and Σ p of a whole line against its whole row: all that it takes where the picture has moved by
-    /// less than half a step.
-    #[inline(always)]
-    pub(super) fn sums<R: Row>(&self, row: usize, pixels: &R) -> Option<(f32, f32)> {
-        let coefficients = self.store.coefficients(row)?;
-        Some(pixels.sums(self.config.kernel, coefficients))
+impl Correlator {
+    /// One that learns, of pixels that are `stride` from one to the next of the same colour.
+    pub(super) fn learning(stride: u8) -> Self {
+        Self {
+            here_px: 0.5 * f32::from(stride),
+            near_px: NEAR_WHILE_LEARNING_PX * f32::from(stride),
+            products: 0,
+        }
+    }
+
+    /// Learning has ended.
+    pub(super) fn end_learning(&mut self, stride: u8, hurried: bool) {
+        self.near_px = NEAR_PX * f32::from(stride);
+        if hurried {
+            self.here_px = self.near_px;
+        }
     }
 
     /// The phase-correlation peak of a line near `expected_px`: one inner product where the motion is
-    /// small. `sums`: those of the whole line, where they were taken before.
+    /// small. `sums`: those of the whole line, where they were taken before; `hurried`: a line time is short.
     #[inline(never)]
-    pub(super) fn correlate<R: Row>(
+    #[expect(clippy::too_many_arguments)]
+    pub(super) fn find<R: Row>(
         &mut self,
+        store: &Store<'_>,
+        light: &mut Light,
         row: usize,
-        table: &RowTable,
         pixels: &mut R,
         expected_px: f32,
-        sums: Option<(f32, f32)>,
+        sums: Sums,
+        hurried: bool,
     ) -> Result<f32, Unfound> {
+        let Some(table) = store.table(row) else {
+            return Err(Unfound::NoNumber);
+        };
+        let mut done = 0;
+        let mut expected_px = expected_px;
         if expected_px.abs() < self.here_px {
-            let Some((product, sum)) = sums.or_else(|| self.sums(row, pixels)) else {
+            let Some((product, sum)) = sums.or_else(|| whole_sums(store, row, pixels)) else {
                 return Err(Unfound::NoNumber);
             };
-            self.to_reference = table.factor_to_reference(sum);
-            let near = table.shift_px(product * self.to_reference);
+            light.to_reference = table.factor_to_reference(sum);
+            let near = table.shift_px(product * light.to_reference);
             if near.abs() <= self.near_px {
                 return Ok(near);
             }
-            let near = near.clamp(-4.0, 4.0);
-            self.effort = self.effort.saturating_add(1);
-            return self.correlate_far(row, table, pixels.pixels(), near, 1);
+            expected_px = near.clamp(-4.0, 4.0);
+            self.products = self.products.saturating_add(1);
+            done = 1;
         }
-        self.correlate_far(row, table, pixels.pixels(), expected_px, 0)
-    }
-
-    /// [`Tracker::correlate`] where the picture has moved by whole pixels: one inner product where that was
-    /// foreseen, a few where not. `done`: how many were taken before.
-    fn correlate_far<P: Pixel>(
-        &mut self,
-        row: usize,
-        table: &RowTable,
-        pixels: &[P],
-        expected_px: f32,
-        done: u8,
-    ) -> Result<f32, Unfound> {
-        let hurried = self.is_hurried();
+        // The picture has moved by whole pixels: one inner product where that was foreseen, a few where not.
         let turns = if hurried { TURNS_IN_A_HURRY } else { TURNS };
-        let far = self.converge(row, table, pixels, expected_px, turns - done);
-        match far {
+        let turns = turns - done;
+        match self.converge(
+            store,
+            light,
+            row,
+            table,
+            pixels.pixels(),
+            expected_px,
+            turns,
+        ) {
             Some((shift_px, true)) => Ok(shift_px),
             Some((shift_px, false)) if hurried => Err(Unfound::Unfinished(shift_px)),
             Some((shift_px, false)) => Ok(shift_px),
@@ -87,8 +114,11 @@ impl Tracker<'_> {
 
     /// The shift after so many inner products, and whether one more would not change it.
     #[inline(always)]
+    #[expect(clippy::too_many_arguments)]
     fn converge<P: Pixel>(
         &mut self,
+        store: &Store<'_>,
+        light: &mut Light,
         row: usize,
         table: &RowTable,
         pixels: &[P],
@@ -96,9 +126,9 @@ impl Tracker<'_> {
         turns: u8,
     ) -> Option<(f32, bool)> {
         let width = pixels.len();
-        let coefficients = self.store.coefficients(row)?;
-        let mean = self.store.mean(row)?;
-        let stride = i32::from(self.config.stride);
+        let coefficients = store.coefficients(row)?;
+        let mean = store.mean(row)?;
+        let stride = store.recipe().stride as i32;
         let limit = width as i32 / 2;
         let steps = |px: f32| nearest_step(px, stride);
         let mut whole = steps(expected_px).clamp(-limit, limit);
@@ -106,18 +136,18 @@ impl Tracker<'_> {
         let mut converged = false;
         for _ in 0..turns {
             let overlap = Overlap::new(width, whole)?;
-            self.effort = self.effort.saturating_add(1);
+            self.products = self.products.saturating_add(1);
             let (product, sum) = P::part_sums(
-                self.config.kernel,
+                store.recipe().kernel,
                 pixels.get(overlap.line)?,
                 coefficients,
                 overlap.reference.start,
             );
             let from = overlap.unseen.start;
-            let unseen = self.config.kernel.light(from, mean.get(overlap.unseen)?);
-            let seen = table.pixel_sum() - unseen as f32 / self.store.recipe().counts_per_value;
-            self.to_reference = at_least_1(seen) / at_least_1(sum);
-            let near = table.shift_px(product * self.to_reference);
+            let unseen = store.recipe().kernel.light(from, mean.get(overlap.unseen)?);
+            let seen = table.pixel_sum() - unseen as f32 / store.recipe().counts_per_value;
+            light.to_reference = at_least_1(seen) / at_least_1(sum);
+            let near = table.shift_px(product * light.to_reference);
             shift_px = whole as f32 + near;
             let next = (whole + steps(near.clamp(-4.0, 4.0))).clamp(-limit, limit);
             converged = near.abs() <= self.near_px || next == whole;
@@ -128,24 +158,31 @@ impl Tracker<'_> {
         }
         shift_px.is_finite().then_some((shift_px, converged))
     }
+}
 
-    /// The whole shift nearest to this one, and the inner product there, brought to the reference's brightness.
-    #[inline(always)]
-    pub(super) fn nearest_product<P: Pixel>(
-        &self,
-        row: usize,
-        pixels: &[P],
-        shift_px: f32,
-    ) -> Option<(i32, f32)> {
-        let width = pixels.len();
-        let whole = nearest_step(shift_px, i32::from(self.config.stride));
-        let overlap = Overlap::new(width, whole)?;
-        let (product, _) = P::part_sums(
-            self.config.kernel,
-            pixels.get(overlap.line)?,
-            self.store.coefficients(row)?,
-            overlap.reference.start,
-        );
-        Some((whole, product * self.to_reference))
-    }
+/// Σ h·p and Σ p of a whole line against its whole row: all that it takes where the picture has moved by
+/// less than half a step.
+#[inline(always)]
+pub(super) fn whole_sums<R: Row>(store: &Store<'_>, row: usize, pixels: &R) -> Sums {
+    Some(pixels.sums(store.recipe().kernel, store.coefficients(row)?))
+}
+
+/// The whole shift nearest to this one, and the inner product there, not yet brought to the reference's
+/// brightness.
+#[inline(always)]
+pub(super) fn nearest_product<P: Pixel>(
+    store: &Store<'_>,
+    row: usize,
+    pixels: &[P],
+    shift_px: f32,
+) -> Option<(i32, f32)> {
+    let whole = nearest_step(shift_px, store.recipe().stride as i32);
+    let overlap = Overlap::new(pixels.len(), whole)?;
+    let (product, _) = P::part_sums(
+        store.recipe().kernel,
+        pixels.get(overlap.line)?,
+        store.coefficients(row)?,
+        overlap.reference.start,
+    );
+    Some((whole, product))
 }

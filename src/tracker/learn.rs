@@ -1,7 +1,8 @@
 //! Learning the reference, in two rounds of frames.
 
-use super::correlate::{NEAR_PX, NEAR_WHILE_LEARNING_PX};
-use super::{Place, Rejected, Stage, Tracker, check::Check, predict::Prediction};
+use super::{
+    Place, Rejected, Stage, Tracker, check::Check, correlate::Correlator, predict::Prediction,
+};
 use crate::{
     camera::pixel::Pixel,
     reference::{NoiseMeter, band::Level, noise::PixelNoise},
@@ -23,19 +24,18 @@ impl Tracker<'_> {
         let values = 32768.0 / self.store.recipe().counts_per_value;
         self.stage = Stage::Rough;
         self.frame = None;
-        self.fast_path.end();
+        self.schedule.fast_path.end();
         self.frames_in_stage = 0;
         self.range_px = 0.0;
-        self.to_reference = 1.0;
+        self.light.to_reference = 1.0;
         self.prediction = Prediction::default();
         self.curvature = Curvature::default();
-        self.here_px = 0.5 * f32::from(self.config.stride);
-        self.near_px = NEAR_WHILE_LEARNING_PX * f32::from(self.config.stride);
+        self.correlator = Correlator::learning(self.config.stride);
         self.blur.relearn();
         #[cfg(feature = "long-exposure")]
         self.paths.relearn();
         self.meter = NoiseMeter::default();
-        self.check = Check::default();
+        self.check = Check::new(super::search::starts(&self.config));
         self.store.forget(
             PixelNoise::guess(values),
             self.config.level.unwrap_or(Level::Medium),
@@ -70,10 +70,8 @@ impl Tracker<'_> {
                 #[cfg(feature = "long-exposure")]
                 self.paths.end_round(true);
                 self.stage = Stage::Tracking;
-                self.near_px = NEAR_PX * f32::from(self.config.stride);
-                if self.is_hurried() {
-                    self.here_px = self.near_px;
-                }
+                let hurried = self.is_hurried();
+                self.correlator.end_learning(self.config.stride, hurried);
             }
             Stage::Tracking => {}
         }
@@ -92,7 +90,7 @@ impl Tracker<'_> {
         self.range_px = 0.0;
         self.frames_in_stage = 0;
         self.frame = None;
-        self.fast_path.end();
+        self.schedule.fast_path.end();
     }
 
     /// Aligns a line and averages it into its reference.
@@ -136,7 +134,7 @@ impl Tracker<'_> {
             self.measure_noise(row, pixels, shift_px, seen.frames);
         }
         self.store
-            .average(row, pixels, shift_px, self.to_reference, u16::MAX);
+            .average(row, pixels, shift_px, self.light.to_reference, u16::MAX);
         if self.stage == Stage::Rough {
             let frames = seen.frames.saturating_add(1);
             if let Some(l) = self.store.learning_mut(row) {
@@ -165,7 +163,7 @@ impl Tracker<'_> {
                 mean,
                 pixels,
                 shift_px,
-                1.0 / self.to_reference,
+                1.0 / self.light.to_reference,
                 self.store.recipe(),
                 frames,
             );

@@ -6,10 +6,10 @@
 
 use super::{
     Stage, Tracker,
-    correlate::Unfound,
-    flicker::Flicker,
+    correlate::{Sums, Unfound, whole_sums},
     predict::Prediction,
     row::{Row, Scattered, Summed},
+    schedule::FastPath,
 };
 use crate::{
     camera::pixel::Pixel,
@@ -53,26 +53,6 @@ pub(super) enum Rejected {
     Occluded,
     Misfit,
 }
-
-/// Which lines take the fast path: rows of this frame below this one.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct FastPath {
-    frame: u32,
-    until_row: u16,
-    /// Rows below this one would, but for a check or a background job.
-    background_until_row: u16,
-}
-
-impl FastPath {
-    /// No line takes it.
-    pub(super) fn end(&mut self) {
-        self.until_row = 0;
-        self.background_until_row = 0;
-    }
-}
-
-/// Σ h·p and Σ p of a line, where they were taken.
-pub(super) type Sums = Option<(f32, f32)>;
 
 impl Tracker<'_> {
     /// Takes one line, whatever comes of it.
@@ -173,8 +153,8 @@ impl Tracker<'_> {
         pixels: &R,
         times: bool,
     ) -> Result<Place, Sums> {
-        let is_fast = line.row < self.fast_path.until_row
-            && line.frame == self.fast_path.frame
+        let is_fast = line.row < self.schedule.fast_path.until_row
+            && line.frame == self.schedule.fast_path.frame
             && pixels.len() == usize::from(self.config.width);
         if !is_fast {
             return Err(None);
@@ -199,8 +179,8 @@ impl Tracker<'_> {
         let shift_px = table.shift_px(product * to_reference);
         let surprise_px = shift_px - self.prediction.predicted_px();
         // Neither is true of what is no number.
-        let small = shift_px.abs() <= self.near_px && Prediction::is_small(surprise_px);
-        if !small || !Flicker::is_plausible(self.to_reference, to_reference) {
+        let small = shift_px.abs() <= self.correlator.near_px && Prediction::is_small(surprise_px);
+        if !small || !self.light.may_become(to_reference) {
             return Err(Some((product, sum)));
         }
         Ok(Measured {
@@ -220,9 +200,9 @@ impl Tracker<'_> {
             information_per_px2,
         } = measured;
         if times {
-            self.flicker.add_settled(self.to_reference, to_reference);
+            self.light.add_settled(to_reference);
         }
-        self.to_reference = to_reference;
+        self.light.to_reference = to_reference;
         self.prediction
             .add_at_rest(surprise_px, information_per_px2);
         self.counts.measured = self.counts.measured.wrapping_add(1);
@@ -242,24 +222,24 @@ impl Tracker<'_> {
         sums: Sums,
         times: bool,
     ) -> Result<Place, Sums> {
-        let at_rest =
-            line.row < self.fast_path.background_until_row && line.frame == self.fast_path.frame;
+        let at_rest = line.row < self.schedule.fast_path.background_until_row
+            && line.frame == self.schedule.fast_path.frame;
         if !at_rest || sums.is_some() || pixels.len() != usize::from(self.config.width) {
             return Err(sums);
         }
         let row = usize::from(line.row);
         let measured = self.measure_fast(row, pixels)?;
-        self.effort = 0;
-        if row >= self.next_check {
-            let before = core::mem::replace(&mut self.to_reference, measured.to_reference);
+        self.correlator.products = 0;
+        if row >= self.schedule.next_check {
+            let before = core::mem::replace(&mut self.light.to_reference, measured.to_reference);
             let fits = self.fits(row, pixels.pixels(), measured.shift_px);
-            self.to_reference = before;
+            self.light.to_reference = before;
             if !fits {
                 return Err(None);
             }
             self.note_fit(true);
             self.after_check(row, pixels.pixels(), Some(measured.shift_px));
-        } else if self.background {
+        } else if self.schedule.background {
             // The reference is not being moved.
             self.work_in_background::<R::P>(row);
         }
@@ -284,7 +264,7 @@ impl Tracker<'_> {
             self.next_frame(line.frame, line.start_ns);
         }
         let mut aside_px = 0.0;
-        let in_background = self.background && self.stage == Stage::Tracking;
+        let in_background = self.schedule.background && self.stage == Stage::Tracking;
         // Then how much time there is is known only afterwards.
         let afterwards = in_background && self.is_hurried();
         if afterwards {
@@ -294,14 +274,21 @@ impl Tracker<'_> {
             aside_px = self.work_in_background::<R::P>(row);
         }
         // A line that will be checked has enough to do.
-        let idle = row < self.next_check;
-        self.effort = 0;
+        let idle = row < self.schedule.next_check;
+        self.correlator.products = 0;
         let found = self.locate(row, &mut pixels, aside_px, sums);
-        if afterwards && self.effort < PRODUCTS_OF_A_CHECK && (idle || self.store.is_moving()) {
+        if afterwards
+            && self.correlator.products < PRODUCTS_OF_A_CHECK
+            && (idle || self.store.is_moving())
+        {
             let columns = self.config.columns_per_line;
-            let fewer = if self.effort > 0 { columns / 4 } else { 0 };
+            let fewer = if self.correlator.products > 0 {
+                columns / 4
+            } else {
+                0
+            };
             self.store.advance_background::<R::P>(row, columns - fewer);
-            self.background = self.store.is_busy() || self.check.is_searching();
+            self.schedule.background = self.store.is_busy() || self.check.is_searching();
         }
         if self.stage != Stage::Tracking {
             self.counts.learning = self.counts.learning.wrapping_add(1);
@@ -328,15 +315,14 @@ impl Tracker<'_> {
     /// motion is swift, and at the beginning of a frame.
     fn settle_fast_path(&mut self, frame: u32) {
         // Where lines are expected then stays between the shifts of those before, none of which is further than `near_px`.
-        let near = self.prediction.predicted_px().abs() < self.here_px;
+        let near = self.prediction.predicted_px().abs() < self.correlator.here_px;
         let unhindered = !self.store.is_moving() && !self.check.is_searching();
-        let at_rest =
-            unhindered && self.prediction.is_at_rest() && self.flicker.is_settled() && near;
+        let at_rest = unhindered && self.prediction.is_at_rest() && self.light.is_settled() && near;
         let rows = usize::from(self.config.rows);
-        self.fast_path = FastPath {
+        self.schedule.fast_path = FastPath {
             frame,
-            until_row: if at_rest && !self.background {
-                self.next_check.min(rows) as u16
+            until_row: if at_rest && !self.schedule.background {
+                self.schedule.next_check.min(rows) as u16
             } else {
                 0
             },
@@ -353,7 +339,7 @@ impl Tracker<'_> {
             .store
             .advance_background::<P>(row, self.config.columns_per_line);
         self.search_elsewhere();
-        self.background = self.store.is_busy() || self.check.is_searching();
+        self.schedule.background = self.store.is_busy() || self.check.is_searching();
         aside_px
     }
 
@@ -390,7 +376,7 @@ impl Tracker<'_> {
         }
         self.frames_in_stage = self.frames_in_stage.saturating_add(1);
         self.frame = Some(frame);
-        self.turn = match self.stage {
+        self.schedule.turn = match self.stage {
             Stage::Tracking => self.store.turn_of(frame, self.is_hurried()),
             Stage::Rough | Stage::Refining => usize::MAX,
         };
@@ -402,9 +388,9 @@ impl Tracker<'_> {
         #[cfg(feature = "long-exposure")]
         self.look_ahead();
         self.check.begin_frame(frame);
-        self.next_check = 0;
-        self.background = self.store.is_busy() || self.check.is_searching();
-        self.flicker.begin_frame();
+        self.schedule.next_check = 0;
+        self.schedule.background = self.store.is_busy() || self.check.is_searching();
+        self.light.begin_frame();
     }
 
     /// Place of a line against the reference, whose row lies `aside_px` to the left of the others.
@@ -424,8 +410,8 @@ impl Tracker<'_> {
         }
         let information_per_px2 = table.information_per_px2();
         let expected = self.prediction.at(row) + aside_px;
-        let before = self.to_reference;
-        let mut shift_px = match self.correlate(row, &table, pixels, expected, sums) {
+        let before = self.light.to_reference;
+        let mut shift_px = match self.correlate(row, pixels, expected, sums) {
             Ok(shift_px) => shift_px,
             Err(Unfound::NoNumber) => return Err(Rejected::NoTexture),
             Err(Unfound::Unfinished(shift_px)) => {
@@ -435,13 +421,13 @@ impl Tracker<'_> {
         };
         let surprise = shift_px - expected;
         // After two inner products there is no time for it where it is but its turn; the next one will do.
-        let in_turn = row >= self.next_check
-            && (self.effort < PRODUCTS_OF_A_CHECK
+        let in_turn = row >= self.schedule.next_check
+            && (self.correlator.products < PRODUCTS_OF_A_CHECK
                 || !self.is_hurried()
                 || self.check.checks_every_line());
         let due = in_turn
             || surprise * surprise * information_per_px2 > 49.0 + information_per_px2
-            || !Flicker::is_plausible(before, self.to_reference);
+            || !self.light.may_have_been(before);
         let mut jumped = false;
         if due {
             // A swift picture must be found again after a gap, and a row that knows so little could take any
@@ -449,8 +435,8 @@ impl Tracker<'_> {
             if self.prediction.needs_more_than(information_per_px2) {
                 return Err(Rejected::NoTexture);
             }
-            let checked = self.check_and_follow(row, &table, pixels.pixels(), shift_px);
-            self.effort = self.effort.saturating_add(PRODUCTS_OF_A_CHECK);
+            let checked = self.check_and_follow(row, pixels.pixels(), shift_px);
+            self.correlator.products = self.correlator.products.saturating_add(PRODUCTS_OF_A_CHECK);
             let Some(checked) = checked else {
                 return Err(Rejected::Occluded);
             };
@@ -466,11 +452,26 @@ impl Tracker<'_> {
         } else {
             self.prediction.add(row, shift_px, information_per_px2);
         }
-        self.flicker.add(before, self.to_reference);
+        self.light.add_since(before);
         Ok(Place {
             shift_px,
             information_per_px2,
         })
+    }
+
+    /// The place of a line near `expected_px`; its light is noted.
+    #[inline(always)]
+    pub(super) fn correlate<R: Row>(
+        &mut self,
+        row: usize,
+        pixels: &mut R,
+        expected_px: f32,
+        sums: Sums,
+    ) -> Result<f32, Unfound> {
+        let hurried = self.is_hurried();
+        let (store, light) = (&self.store, &mut self.light);
+        self.correlator
+            .find(store, light, row, pixels, expected_px, sums, hurried)
     }
 
     /// A row without texture tells of the light too, where it is neither dark nor near to being clipped.
@@ -484,9 +485,10 @@ impl Tracker<'_> {
         if !(dark..bright).contains(&mean) {
             return;
         }
-        if let Some((_, sum)) = self.sums(row, pixels) {
-            let before = core::mem::replace(&mut self.to_reference, table.factor_to_reference(sum));
-            self.flicker.add(before, self.to_reference);
+        if let Some((_, sum)) = whole_sums(&self.store, row, pixels) {
+            let before = self.light.to_reference;
+            self.light.to_reference = table.factor_to_reference(sum);
+            self.light.add_since(before);
         }
     }
 
@@ -495,11 +497,10 @@ impl Tracker<'_> {
     fn check_and_follow<P: Pixel>(
         &mut self,
         row: usize,
-        table: &RowTable,
         pixels: &[P],
         shift_px: f32,
     ) -> Option<f32> {
-        let checked = self.check_line(row, table, pixels, shift_px);
+        let checked = self.check_line(row, pixels, shift_px);
         self.after_check(row, pixels, checked);
         checked
     }
@@ -507,18 +508,22 @@ impl Tracker<'_> {
     /// `checked`: the shift of a line that was found to fit.
     fn after_check<P: Pixel>(&mut self, row: usize, pixels: &[P], checked: Option<f32>) {
         if let Some(shift_px) = checked
-            && self.turn == row
+            && self.schedule.turn == row
         {
             let hurried = self.is_hurried();
             self.store
-                .follow_row(row, pixels, shift_px, self.to_reference, hurried);
+                .follow_row(row, pixels, shift_px, self.light.to_reference, hurried);
         }
-        self.next_check = self.check.next_due(row, self.is_hurried());
-        if self.turn > row {
-            self.next_check = self.next_check.min(self.turn);
+        self.schedule.next_check = self.check.next_due(row, self.is_hurried());
+        if self.schedule.turn > row {
+            self.schedule.next_check = self.schedule.next_check.min(self.schedule.turn);
         }
-        self.background = self.store.is_busy() || self.check.is_searching();
+        self.schedule.background = self.store.is_busy() || self.check.is_searching();
         // Some ten microseconds before it is read: between two checks of a row, 32 frames have been through the caches.
-        kernel::ask_for(self.store.mean(self.next_check).unwrap_or_default());
+        kernel::ask_for(
+            self.store
+                .mean(self.schedule.next_check)
+                .unwrap_or_default(),
+        );
     }
 }

@@ -14,15 +14,18 @@ mod check;
 mod config;
 mod correlate;
 mod counts;
-mod flicker;
 mod gap;
 mod learn;
+mod light;
 mod line;
 mod overlap;
 #[cfg(feature = "long-exposure")]
 mod path;
 mod predict;
+mod residual;
 mod row;
+mod schedule;
+mod search;
 #[cfg(test)]
 mod tests;
 
@@ -37,11 +40,12 @@ use crate::{
 };
 use blur::Blur;
 use check::Check;
-use correlate::NEAR_WHILE_LEARNING_PX;
-use flicker::Flicker;
-use line::{FastPath, Place, Rejected};
+use correlate::Correlator;
+use light::Light;
+use line::{Place, Rejected};
 use predict::Prediction;
 use row::Row;
+use schedule::Schedule;
 
 /// The outcome of a line.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -78,12 +82,9 @@ pub struct Tracker<'a> {
     room: &'a mut [u8],
     stage: Stage,
     frame: Option<u32>,
-    fast_path: FastPath,
     frames_in_stage: u16,
     prediction: Prediction,
-    /// The factor that brings the last line to its reference's brightness.
-    to_reference: f32,
-    flicker: Flicker,
+    light: Light,
     blur: Blur,
     #[cfg(feature = "long-exposure")]
     paths: path::Paths,
@@ -91,22 +92,10 @@ pub struct Tracker<'a> {
     /// Largest shift met in this round, px.
     range_px: f32,
     check: Check,
+    correlator: Correlator,
+    schedule: Schedule,
     /// See [`Tracker::curvature`]; where lines are not unsmeared one by one.
     curvature: Curvature,
-    /// The row of this frame from which the reference is followed; none while learning.
-    turn: usize,
-    /// A background job waits for the next line: the reference is followed, or a lost picture
-    /// is searched for.
-    background: bool,
-    /// The row from which on the next line is checked.
-    next_check: usize,
-    /// What the line has taken beyond most: inner products where it had moved by whole pixels, and checks, each as two.
-    effort: u8,
-    /// A line that is expected nearer than this is read where its reference lies: half the pixels from one to the next of
-    /// the same colour, or `near_px` where a line time is short, as reading it elsewhere takes longer.
-    here_px: f32,
-    /// `NEAR_PX` of those pixels.
-    near_px: f32,
     counts: Counts,
 }
 
@@ -137,11 +126,9 @@ impl<'a> Tracker<'a> {
             room: &mut [],
             stage: Stage::Rough,
             frame: None,
-            fast_path: FastPath::default(),
             frames_in_stage: 0,
             prediction: Prediction::default(),
-            to_reference: 1.0,
-            flicker: Flicker::new(&config.timing),
+            light: Light::new(&config.timing),
             blur: Blur::new(&config.timing),
             #[cfg(feature = "long-exposure")]
             paths: path::Paths::new(
@@ -151,14 +138,10 @@ impl<'a> Tracker<'a> {
             ),
             meter: NoiseMeter::default(),
             range_px: 0.0,
-            check: Check::default(),
+            check: Check::new(search::starts(&config)),
+            correlator: Correlator::learning(config.stride),
+            schedule: Schedule::new(),
             curvature: Curvature::default(),
-            turn: usize::MAX,
-            background: false,
-            next_check: 0,
-            effort: 0,
-            here_px: 0.0,
-            near_px: NEAR_WHILE_LEARNING_PX * f32::from(config.stride),
             counts: Counts::default(),
         };
         tracker.relearn();
@@ -301,9 +284,9 @@ impl<'a> Tracker<'a> {
             Ok(place) => Outcome::Measured(Displacement {
                 frame: line.frame,
                 row: line.row,
-                time_ns: self.middle_ns(line).wrapping_add(i64::from(
-                    self.flicker.delay_ns(self.to_reference).unwrap_or(0.0) as i32,
-                )),
+                time_ns: self
+                    .middle_ns(line)
+                    .wrapping_add(i64::from(self.light.delay_ns().unwrap_or(0.0) as i32)),
                 shift_px: place.shift_px + self.store.anchor_px(),
                 information_per_px2: place.information_per_px2,
                 vertical: None,
@@ -336,7 +319,7 @@ impl<'a> Tracker<'a> {
         binner.push_row(row, || Begin {
             middle_ns: self.middle_ns(line),
             curvature,
-            to_reference: self.to_reference,
+            to_reference: self.light.to_reference,
             anchor_px: self.store.anchor_px(),
         })
     }

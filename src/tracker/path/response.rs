@@ -5,7 +5,7 @@ use crate::{
     camera::pixel::Pixel,
     reference::RowTable,
     reference::align::between,
-    tracker::{RowLearning, Stage, Tracker, overlap::Overlap},
+    tracker::{RowLearning, Stage, Tracker, correlate::nearest_product, overlap::Overlap},
 };
 
 /// The row's phase-correlation function at whole steps from −SHARP to SHARP, as a line exposed in no time would meet it,
@@ -134,7 +134,8 @@ impl Tracker<'_> {
         }
         let width = pixels.len();
         let stride = f32::from(self.config.stride);
-        let (whole, product) = self.nearest_product(row, pixels, shift_px)?;
+        let (whole, product) = nearest_product(&self.store, row, pixels, shift_px)?;
+        let product = product * self.light.to_reference;
         let mut q = self.correlation_function(row, width)?;
         self.paths.note_repetition(&q);
         if self.stage == Stage::Tracking {

@@ -1,0 +1,104 @@
+//! What a line leaves over when its shifted reference is taken off.
+
+use super::overlap::{Overlap, nearest_step};
+use crate::{
+    camera::pixel::Pixel,
+    reference::{Store, noise::LEAST_VARIANCE},
+};
+
+/// The residual of a line, per pixel and in units of the pixels' variance.
+pub(super) struct Residual {
+    /// Mean square.
+    pub(super) power: f32,
+    /// Mean square that an error of the shift of 1 px would leave.
+    pub(super) slope_power: f32,
+}
+
+impl Residual {
+    /// What noise does not explain, as the square of an error of the shift, px².
+    pub(super) fn excess_px2(&self) -> f32 {
+        (self.power - 2.0).max(0.0) / self.slope_power.max(1e-9)
+    }
+
+    /// What is left of a line of `row` at `shift_px` when its shifted reference is taken off. `to_reference`: the factor
+    /// that brings it to its reference's brightness; about so many `columns` are read.
+    pub(super) fn of<P: Pixel>(
+        store: &Store<'_>,
+        row: usize,
+        pixels: &[P],
+        shift_px: f32,
+        to_reference: f32,
+        columns: usize,
+    ) -> Option<Self> {
+        let width = pixels.len();
+        let r = store.recipe();
+        let mean = store.mean(row)?;
+        let stride = r.stride as i32;
+        let whole = nearest_step(shift_px, stride);
+        let near = shift_px - whole as f32;
+        let overlap = Overlap::new(width, whole)?;
+        let (mean, mask) = (
+            mean.get(overlap.reference.clone())?,
+            store.mask().get(overlap.reference)?,
+        );
+        let line = pixels.get(overlap.line)?;
+        // What the motion carries in and out at the ends is little known.
+        let from = r.margin_px + r.stride;
+        let to = mean.len().checked_sub(from)?;
+        let n = to.checked_sub(from)?;
+        let step = (width / columns).max(1);
+        let (left, here, right) = (
+            mean.get(from - r.stride..)?.get(..n)?,
+            mean.get(from..)?.get(..n)?,
+            mean.get(from + r.stride..)?.get(..n)?,
+        );
+        let (line, mask) = (line.get(from..)?.get(..n)?, mask.get(from..)?.get(..n)?);
+        // All in counts of the reference.
+        let value = 1.0 / r.counts_per_value;
+        let gain = value / to_reference;
+        let near = near / r.stride as f32;
+        let saturation = r.saturation * r.counts_per_value;
+        let per_count = r.noise.per_value * value;
+        let (mut power, mut slopes, mut read) = (0.0f32, 0.0f32, 0u16);
+        // Not at the very edge, which a reference that was moved does not know.
+        let mut next = step / 2;
+        while next < n {
+            let x = next;
+            next += step;
+            let (Some(&left), Some(&here), Some(&right), Some(&p), Some(&mask)) = (
+                left.get(x),
+                here.get(x),
+                right.get(x),
+                line.get(x),
+                mask.get(x),
+            ) else {
+                break;
+            };
+            let (left, here, right) = (f32::from(left), f32::from(here), f32::from(right));
+            if mask == 0 || here >= saturation {
+                continue;
+            }
+            let slope = right - left;
+            let bend = right + left - 2.0 * here;
+            let model = here - 0.5 * near * (slope - near * bend);
+            let residual = f32::from(p.value()) - gain * model;
+            let variance = r.noise.dark + per_count * here;
+            let weight = 1.0
+                / if variance > LEAST_VARIANCE {
+                    variance
+                } else {
+                    LEAST_VARIANCE
+                };
+            power += residual * residual * weight;
+            slopes += slope * slope * weight;
+            read += 1;
+        }
+        let frames = f32::from(store.learning(row)?.frames());
+        let own = 1.0 / (f32::from(read) * (1.0 + 1.0 / frames));
+        let slope_px = 0.5 * value / r.stride as f32;
+        (read >= 4).then_some(Self {
+            power: power * own,
+            slope_power: slopes * own * slope_px * slope_px,
+        })
+    }
+}
