@@ -111,7 +111,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         scenes.push((look.name().to_owned(), summaries));
     }
     if let Some(path) = &args.plot {
-        rowtone_plot::write(path, summary::figure(&scenes).svg())?;
+        rowtone_plot::write(path, &summary::figure(&scenes))?;
     }
     let title = format!(
         "{}x{}, {} frames at 60 fps, {} Hz, {} px, seeds {} to {}\n\n",

@@ -1,10 +1,11 @@
-//! The picture itself, as SVG: spectrum above, displacement and spectrogram below.
+//! The picture itself: spectrum above, displacement and spectrogram below.
 
 use plotters::coord::Shift;
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 use rowtone::report::Report;
 
+use super::file::{DrawError, Drawing};
 use super::residual::Fit;
 use super::spectrogram::Spectrogram;
 use rowtone_report::text::digits;
@@ -48,27 +49,27 @@ pub(super) struct Scene<'a> {
     pub one_a_frame: bool,
 }
 
-type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
-type Drawn = Result<(), Box<dyn std::error::Error>>;
+type Area<B> = DrawingArea<B, Shift>;
+type Drawn = Result<(), DrawError>;
 
-/// Draws the scene.
-///
-/// # Errors
-/// What the drawing library says.
-pub(super) fn svg(scene: &Scene<'_>) -> Result<String, Box<dyn std::error::Error>> {
-    let mut text = String::new();
+impl Drawing for Scene<'_> {
+    fn size(&self) -> (u32, u32) {
+        SIZE
+    }
+
+    fn draw<B>(&self, root: &Area<B>) -> Drawn
+    where
+        B: DrawingBackend,
+        B::ErrorType: 'static,
     {
-        let root = SVGBackend::with_string(&mut text, SIZE).into_drawing_area();
         root.fill(&WHITE)?;
-        let root = root.titled(scene.title, font(20))?;
+        let root = root.titled(self.title, font(20))?;
         let (above, below) = root.split_vertically(430);
         let (left, right) = below.split_horizontally(600);
-        spectrum(&above, scene)?;
-        displacement(&left, scene)?;
-        spectrogram(&right, scene)?;
-        root.present()?;
+        spectrum(&above, self)?;
+        displacement(&left, self)?;
+        spectrogram(&right, self)
     }
-    Ok(text)
 }
 
 fn font(size: u32) -> TextStyle<'static> {
@@ -92,7 +93,11 @@ fn amplitude_range(scene: &Scene<'_>) -> std::ops::Range<f64> {
     low..high * 3.0
 }
 
-fn spectrum(area: &Area<'_>, scene: &Scene<'_>) -> Drawn {
+fn spectrum<B>(area: &Area<B>, scene: &Scene<'_>) -> Drawn
+where
+    B: DrawingBackend,
+    B::ErrorType: 'static,
+{
     let range = amplitude_range(scene);
     let band = scene.band_hz;
     let mut chart = ChartBuilder::on(area)
@@ -147,7 +152,11 @@ fn spectrum(area: &Area<'_>, scene: &Scene<'_>) -> Drawn {
     Ok(())
 }
 
-fn displacement(area: &Area<'_>, scene: &Scene<'_>) -> Drawn {
+fn displacement<B>(area: &Area<B>, scene: &Scene<'_>) -> Drawn
+where
+    B: DrawingBackend,
+    B::ErrorType: 'static,
+{
     let frames = if scene.one_a_frame { 150 } else { 4 };
     let fit = scene.fit;
     let first = fit.frames.first().copied().unwrap_or(0);
@@ -194,12 +203,16 @@ fn displacement(area: &Area<'_>, scene: &Scene<'_>) -> Drawn {
     Ok(())
 }
 
-fn mesh<'a>(
-    chart: &mut ChartContext<'a, SVGBackend<'a>, Cartesian2d<RangedCoordf64, RangedCoordf64>>,
+fn mesh<B>(
+    chart: &mut ChartContext<'_, B, Cartesian2d<RangedCoordf64, RangedCoordf64>>,
     x: &str,
     y: &str,
     tall: f64,
-) -> Drawn {
+) -> Drawn
+where
+    B: DrawingBackend,
+    B::ErrorType: 'static,
+{
     let decimals = (1.0 - tall.log10()).ceil().clamp(0.0, 6.0) as usize;
     chart
         .configure_mesh()
@@ -217,7 +230,11 @@ fn mesh<'a>(
     Ok(())
 }
 
-fn spectrogram(area: &Area<'_>, scene: &Scene<'_>) -> Drawn {
+fn spectrogram<B>(area: &Area<B>, scene: &Scene<'_>) -> Drawn
+where
+    B: DrawingBackend,
+    B::ErrorType: 'static,
+{
     let range = amplitude_range(scene);
     let (low, high) = (range.start.log10(), range.end.log10());
     let columns = scene.spectrogram.columns();
@@ -244,7 +261,7 @@ fn spectrogram(area: &Area<'_>, scene: &Scene<'_>) -> Drawn {
         let mut from = 0;
         // One rectangle for each run of one shade, a little larger than it is: what comes next covers
         // the rest, and no seam shows between them.
-        let seam = (width * 0.1, height * 0.5);
+        let seam = (width * 0.1, height);
         for run in shades.chunk_by(|a, b| a == b) {
             let to = from + run.len();
             let y = |row: usize| band.0 + height * row as f64;

@@ -3,18 +3,20 @@
 //! A [`Picture`] is shown every sample and every report and drawn at the end. It keeps the samples of
 //! one window and a bounded number of spectra, so it does not grow with the recording.
 
+mod canvas;
 mod draw;
-mod render;
+mod file;
+mod glyphs;
 mod residual;
 mod spectrogram;
 
 use std::collections::VecDeque;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use rowtone::report::Report;
 use rowtone::timeline::Sample;
 
-pub use render::png;
+pub use file::{DrawError, Drawing, check_ending, png, svg, write};
 
 use self::residual::Fit;
 use self::spectrogram::Spectrogram;
@@ -135,11 +137,7 @@ impl Picture {
         let Some((report, fit)) = &self.last else {
             return Ok(());
         };
-        let path = &self.settings.path;
-        let failed = |error: &dyn std::fmt::Display| {
-            Failure::input(format!("{}: cannot be drawn: {error}", path.display()))
-        };
-        let svg = draw::svg(&draw::Scene {
+        let scene = draw::Scene {
             title: &self.settings.title,
             report,
             fit,
@@ -147,49 +145,7 @@ impl Picture {
             spectrogram: &self.spectrogram,
             band_hz: self.settings.band_hz,
             one_a_frame: self.settings.one_a_frame,
-        })
-        .map_err(|error| failed(&error))?;
-        write(path, svg)
-    }
-}
-
-/// Writes a drawing, as what the file's ending says.
-///
-/// # Errors
-/// [`Failure::Input`] when it cannot be drawn or written.
-pub fn write(path: &Path, svg: String) -> Result<(), Failure> {
-    let name = path.display();
-    let bytes = match ending(path) {
-        Some(Ending::Png) => png(&svg)
-            .map_err(|error| Failure::input(format!("{name}: cannot be drawn: {error}")))?,
-        _ => svg.into_bytes(),
-    };
-    std::fs::write(path, bytes).map_err(|error| Failure::writing(&name.to_string(), &error))
-}
-
-/// Whether a picture of this name can be drawn.
-///
-/// # Errors
-/// [`Failure::Usage`] when its ending is neither `.svg` nor `.png`.
-pub fn check_ending(path: &Path) -> Result<(), Failure> {
-    match ending(path) {
-        Some(_) => Ok(()),
-        None => Err(Failure::usage(format!(
-            "--plot {}: want a file that ends in .svg or .png",
-            path.display()
-        ))),
-    }
-}
-
-enum Ending {
-    Svg,
-    Png,
-}
-
-fn ending(path: &Path) -> Option<Ending> {
-    match path.extension()?.to_str()?.to_ascii_lowercase().as_str() {
-        "svg" => Some(Ending::Svg),
-        "png" => Some(Ending::Png),
-        _ => None,
+        };
+        write(&self.settings.path, &scene)
     }
 }

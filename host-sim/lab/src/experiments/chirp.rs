@@ -97,7 +97,7 @@ pub fn run(folder: &Folder, scale: Scale) -> Result<(), Failure> {
         top_hz: 1200.0,
         range_db: 50.0,
     };
-    folder.drawing("chirp.png", figure.svg())
+    folder.drawing("chirp.png", &figure)
 }
 
 /// What every method hears in a film; first what is heard where every row is known exactly.

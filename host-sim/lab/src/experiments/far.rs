@@ -110,5 +110,5 @@ pub fn run(folder: &Folder) -> Result<(), Failure> {
         curves: columns.iter().map(curve).collect(),
         dots: false,
     };
-    folder.drawing("far.svg", figure.svg())
+    folder.drawing("far.svg", &figure)
 }

@@ -17,6 +17,7 @@ use std::path::{Path, PathBuf};
 
 use host_sim::SimError;
 use rowtone_failure::Failure;
+use rowtone_plot::Drawing;
 
 pub mod chirp;
 pub mod far;
@@ -108,13 +109,8 @@ impl Folder {
     ///
     /// # Errors
     /// [`Failure::Input`] where it cannot be drawn or written.
-    pub fn drawing(
-        &self,
-        name: &str,
-        svg: Result<String, Box<dyn std::error::Error>>,
-    ) -> Result<(), Failure> {
-        let svg = svg.map_err(|e| Failure::input(format!("{name}: cannot be drawn: {e}")))?;
-        rowtone_plot::write(&self.file(name), svg)
+    pub fn drawing(&self, name: &str, drawing: &impl Drawing) -> Result<(), Failure> {
+        rowtone_plot::write(&self.file(name), drawing)
     }
 
     /// Writes a sound, its peak at nine tenths of full scale, 16 bits.

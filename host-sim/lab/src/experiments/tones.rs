@@ -115,7 +115,7 @@ pub fn run(folder: &Folder, scale: Scale, amplitude_px: f64) -> Result<(), Failu
         curves,
         dots: true,
     };
-    folder.drawing("tones.svg", figure.svg())
+    folder.drawing("tones.svg", &figure)
 }
 
 #[cfg(test)]

@@ -92,6 +92,6 @@ pub fn run(folder: &Folder, scale: Scale) -> Result<(), Failure> {
     let music = heard(folder, &setup, &sounds::music(), "music", &mut text)?;
     let speech = heard(folder, &setup, &sounds::speech(), "speech", &mut text)?;
     folder.table("voices.md", &text)?;
-    folder.drawing("music.png", music.svg())?;
-    folder.drawing("speech.png", speech.svg())
+    folder.drawing("music.png", &music)?;
+    folder.drawing("speech.png", &speech)
 }

@@ -1,8 +1,11 @@
 //! One line a method: a dot a series, with a whisker from the least to the largest, on a logarithmic axis.
 
-use std::fmt::Write;
+use plotters::coord::Shift;
+use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+use rowtone_plot::{DrawError, Drawing};
 
-use super::{escaped, hex};
+use super::colour;
 
 /// Least, middle and largest value.
 pub type Range = [f64; 3];
@@ -20,72 +23,81 @@ pub struct Dots {
     pub decades: (i32, i32),
 }
 
-const LEFT: f64 = 250.0;
+const LEFT: i32 = 250;
 const WIDTH: f64 = 560.0;
-const TOP: f64 = 74.0;
-const STEP: f64 = 30.0;
+const TOP: i32 = 74;
+const STEP: i32 = 30;
 
 impl Dots {
     /// Place of a value across; what lies beyond the axis is drawn at its end.
-    fn x(&self, value: f64) -> f64 {
+    fn x(&self, value: f64) -> i32 {
         let (first, last) = (f64::from(self.decades.0), f64::from(self.decades.1));
         let place = (value.max(f64::MIN_POSITIVE).log10() - first) / (last - first);
-        LEFT + WIDTH * place.clamp(0.0, 1.0)
+        LEFT + (WIDTH * place.clamp(0.0, 1.0)).round() as i32
     }
 
-    /// The drawing as SVG.
-    pub fn svg(&self) -> String {
-        let bottom = TOP + STEP * self.lines.len() as f64;
-        let mut svg = format!(
-            "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 860 {}\" font-family=\"sans-serif\" font-size=\"14\" fill=\"#262c34\">\n\
-             <rect width=\"860\" height=\"{}\" fill=\"white\"/>\n<text x=\"16\" y=\"26\" font-size=\"16\">{}</text>\n",
-            bottom + 34.0,
-            bottom + 34.0,
-            escaped(&self.title)
-        );
+    fn bottom(&self) -> i32 {
+        TOP + STEP * self.lines.len() as i32
+    }
+}
+
+/// Text of this size, in a drawing's units of an SVG, about its place.
+fn text(size: f64, across: HPos) -> TextStyle<'static> {
+    // plotters' size of a font is not what an em is: an em is 1/1.24 of it.
+    ("sans-serif", 1.24 * size)
+        .into_font()
+        .color(&RGBColor(38, 44, 52))
+        .pos(Pos::new(across, VPos::Center))
+}
+
+impl Drawing for Dots {
+    fn size(&self) -> (u32, u32) {
+        (860, (self.bottom() + 34) as u32)
+    }
+
+    fn draw<B>(&self, on: &DrawingArea<B, Shift>) -> Result<(), DrawError>
+    where
+        B: DrawingBackend,
+        B::ErrorType: 'static,
+    {
+        let bottom = self.bottom();
+        on.fill(&WHITE)?;
+        on.draw(&Text::new(
+            self.title.as_str(),
+            (16, 21),
+            text(16.0, HPos::Left),
+        ))?;
         for decade in self.decades.0..=self.decades.1 {
             let value = 10f64.powi(decade);
             let x = self.x(value);
-            // Writing to a string cannot fail.
-            let _ = writeln!(
-                svg,
-                "<path d=\"M{x:.1} {:.1}V{bottom:.1}\" stroke=\"#d5dae0\"/><text x=\"{x:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{value}</text>",
-                TOP - 8.0,
-                bottom + 20.0
-            );
+            let line = [(x, TOP - 8), (x, bottom)];
+            on.draw(&PathElement::new(line, RGBColor(213, 218, 224)))?;
+            let style = text(14.0, HPos::Center);
+            on.draw(&Text::new(value.to_string(), (x, bottom + 16), style))?;
         }
         for (k, (name, _)) in self.series.iter().enumerate() {
-            let x = LEFT + 150.0 * k as f64;
-            let _ = writeln!(
-                svg,
-                "<circle cx=\"{x}\" cy=\"48\" r=\"5\" fill=\"{}\"/><text x=\"{}\" y=\"53\">{}</text>",
-                hex(k),
-                x + 12.0,
-                escaped(name)
-            );
+            let x = LEFT + 150 * k as i32;
+            on.draw(&Circle::new((x, 48), 5, colour(k).filled()))?;
+            on.draw(&Text::new(
+                name.as_str(),
+                (x + 12, 48),
+                text(14.0, HPos::Left),
+            ))?;
         }
         for (i, line) in self.lines.iter().enumerate() {
-            let middle = TOP + STEP * (i as f64 + 0.5);
-            let _ = writeln!(
-                svg,
-                "<text x=\"{}\" y=\"{:.1}\" text-anchor=\"end\">{}</text>",
-                LEFT - 16.0,
-                middle + 5.0,
-                escaped(line)
-            );
+            let middle = TOP + STEP * i as i32 + STEP / 2;
+            let style = text(14.0, HPos::Right);
+            on.draw(&Text::new(line.as_str(), (LEFT - 16, middle), style))?;
             for (k, (_, values)) in self.series.iter().enumerate() {
-                let y = middle + 7.0 * (k as f64 - 0.5 * (self.series.len() as f64 - 1.0));
+                let y = middle + (14 * k as i32 - 7 * (self.series.len() as i32 - 1)) / 2;
                 if let Some(Some([low, here, high])) = values.get(i) {
-                    let (from, to, x) = (self.x(*low), self.x(*high), self.x(*here));
-                    let colour = hex(k);
-                    let _ = writeln!(
-                        svg,
-                        "<path d=\"M{from:.1} {y:.1}H{to:.1}\" stroke=\"{colour}\" stroke-width=\"2\"/><circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"4\" fill=\"{colour}\"/>"
-                    );
+                    let line = [(self.x(*low), y), (self.x(*high), y)];
+                    on.draw(&PathElement::new(line, colour(k).stroke_width(2)))?;
+                    on.draw(&Circle::new((self.x(*here), y), 4, colour(k).filled()))?;
                 }
             }
         }
-        svg + "</svg>\n"
+        Ok(())
     }
 }
 
@@ -101,13 +113,10 @@ mod tests {
             series: vec![("s".to_owned(), vec![Some([1.0, 10.0, 1e9]), None])],
             decades: (0, 2),
         };
-        assert_eq!(
-            (dots.x(0.1), dots.x(10.0), dots.x(1e9)),
-            (250.0, 530.0, 810.0)
-        );
-        let svg = dots.svg();
+        assert_eq!((dots.x(0.1), dots.x(10.0), dots.x(1e9)), (250, 530, 810));
+        let svg = rowtone_plot::svg(&dots).expect("an SVG");
         assert!(
-            svg.contains("a &lt; b") && svg.contains("M250.0 89.0H810.0"),
+            svg.contains("a &lt; b") && svg.contains("points=\"250,89 810,89 \""),
             "{svg}"
         );
         assert_eq!(svg.matches("r=\"4\"").count(), 1);

@@ -1,4 +1,4 @@
-//! Drawings for the tables of docs/results.md, as SVG text; [`rowtone_plot::write`] makes files of them.
+//! Drawings for the tables of docs/results.md, which [`rowtone_plot::write`] makes files of.
 //!
 //! | file | what it draws |
 //! | --- | --- |
@@ -10,6 +10,8 @@ pub mod dots;
 pub mod lines;
 pub mod shades;
 
+use plotters::style::RGBColor;
+
 /// Colours that are told apart by most eyes (Okabe and Ito 2008): blue, vermilion, green, yellow-orange, purple.
 pub const COLOURS: [(u8, u8, u8); 5] = [
     (0, 114, 178),
@@ -19,15 +21,8 @@ pub const COLOURS: [(u8, u8, u8); 5] = [
     (204, 121, 167),
 ];
 
-/// A colour for SVG.
-fn hex(index: usize) -> String {
+/// The colour of a series.
+fn colour(index: usize) -> RGBColor {
     let (r, g, b) = COLOURS[index % COLOURS.len()];
-    format!("#{r:02x}{g:02x}{b:02x}")
-}
-
-/// Text for SVG.
-fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;")
-        .replace('<', "&lt;")
-        .replace('>', "&gt;")
+    RGBColor(r, g, b)
 }

@@ -1,6 +1,8 @@
 //! Spectrograms beside each other.
 
+use plotters::coord::Shift;
 use plotters::prelude::*;
+use rowtone_plot::{DrawError, Drawing};
 
 use crate::sound::stft::Spectrogram;
 
@@ -20,34 +22,37 @@ pub struct Panels {
     pub range_db: f64,
 }
 
-impl Panels {
-    /// The drawing as SVG: large, meant to become a PNG.
-    ///
-    /// # Errors
-    /// What the drawing library says.
-    pub fn svg(&self) -> Result<String, Box<dyn std::error::Error>> {
-        let mut text = String::new();
-        let rows = self.panels.len().div_ceil(2);
-        {
-            let size = (800, 40 + 250 * rows as u32);
-            let root = SVGBackend::with_string(&mut text, size).into_drawing_area();
-            root.fill(&WHITE)?;
-            let root = root.titled(&self.title, ("sans-serif", 18))?;
-            for (area, (name, spectrogram)) in root.split_evenly((rows, 2)).iter().zip(&self.panels)
-            {
-                self.panel(area, name, spectrogram)?;
-            }
-            root.present()?;
-        }
-        Ok(text)
+impl Drawing for Panels {
+    fn size(&self) -> (u32, u32) {
+        (800, 40 + 250 * self.panels.len().div_ceil(2) as u32)
     }
 
-    fn panel(
+    fn draw<B>(&self, root: &DrawingArea<B, Shift>) -> Result<(), DrawError>
+    where
+        B: DrawingBackend,
+        B::ErrorType: 'static,
+    {
+        root.fill(&WHITE)?;
+        let root = root.titled(&self.title, ("sans-serif", 18))?;
+        let areas = root.split_evenly((self.panels.len().div_ceil(2), 2));
+        for (area, (name, spectrogram)) in areas.iter().zip(&self.panels) {
+            self.panel(area, name, spectrogram)?;
+        }
+        Ok(())
+    }
+}
+
+impl Panels {
+    fn panel<B>(
         &self,
-        area: &DrawingArea<SVGBackend<'_>, plotters::coord::Shift>,
+        area: &DrawingArea<B, Shift>,
         name: &str,
         spectrogram: &Spectrogram,
-    ) -> Result<(), Box<dyn std::error::Error>> {
+    ) -> Result<(), DrawError>
+    where
+        B: DrawingBackend,
+        B::ErrorType: 'static,
+    {
         let columns = &spectrogram.columns;
         let end_s = (spectrogram.hop_s * columns.len() as f64).max(1e-3);
         let mut chart = ChartBuilder::on(area)
