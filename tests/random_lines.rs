@@ -10,7 +10,7 @@ use rowtone::pipeline::Analyzer;
 use rowtone::reference::band::Level;
 use rowtone::spectrum;
 use rowtone::timeline::{Binner, Displacement, Group};
-use rowtone::tracker::{self, Config, Outcome, Tracker};
+use rowtone::tracker::{self, Axes, Config, Outcome, Tracker};
 use rowtone::wire::{Message, binary, text};
 
 /// A small fast generator (xorshift64*, Vigna 2016).
@@ -75,9 +75,10 @@ prop_compose! {
         search_px in prop_oneof![Just(0u16), Just(48), any::<u16>()],
         columns_per_line in prop_oneof![Just(0u16), Just(7), Just(u16::MAX)],
         kernel in sample::select(Kernel::all().collect::<Vec<_>>()),
+        axes in sample::select(vec![Axes::X, Axes::Xy]),
     ) -> Config {
         let timing = Timing::new(line_time_ps, exposure_ns, rows + spare_rows).unwrap();
-        Config { timing, width, rows, bits, stride, learn_frames, level, search_px, columns_per_line, kernel }
+        Config { timing, width, rows, bits, stride, learn_frames, level, search_px, columns_per_line, kernel, axes }
     }
 }
 
@@ -119,7 +120,8 @@ proptest! {
             _ => 0,
         });
         let mut memory = Box::new(tracker::StaticStorage::<{ 700 * 40 }, 40, 700>::new());
-        let lent = memory.lend();
+        let mut vertical = Box::new(tracker::StaticVerticalStorage::<{ 700 * 40 }, 40, 700>::new());
+        let lent = memory.lend().with_vertical(vertical.lend());
         lent.mask.iter_mut().zip(columns).for_each(|(weight, given)| *weight = given);
         let mut room = vec![0; room];
         let mut tracker = Tracker::new(config, lent).unwrap().with_line_room(&mut room);
@@ -156,7 +158,13 @@ proptest! {
                 let start_ns = if wild { time_of(&mut dice, ordinary) } else { ordinary };
                 let line = Line { frame, row, start_ns, pixels: seen };
                 let Outcome::Measured(d) = tracker.push(&line) else { continue };
-                prop_assert!(d.shift_px.is_finite() && d.information_per_px2 > 0.0, "{d:?}");
+                prop_assert_eq!(d.vertical.is_some(), config.axes == Axes::Xy);
+                let v = d.vertical.unwrap_or_default();
+                // A row whose edges all lie along it tells of y alone.
+                let known = d.information_per_px2 > 0.0
+                    || d.information_per_px2 == 0.0 && v.information_per_px2 > 0.0;
+                prop_assert!(d.shift_px.is_finite() && known, "{d:?}");
+                prop_assert!(v.shift_px.is_finite() && v.coupling.is_finite(), "{d:?}");
                 let Some(sample) = binner.push(d) else { continue };
                 if analyzer.push(sample) && let Some(report) = analyzer.report() {
                     say(report);

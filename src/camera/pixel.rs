@@ -8,6 +8,8 @@ pub(crate) trait Pixel: Copy {
     fn value(self) -> u16;
     /// Σ h·p and Σ p of a line, of at most 8192 pixels, with the whole row of coefficients that is kept.
     fn sums(kernel: Kernel, pixels: &[Self], row: &[i8]) -> (f32, f32);
+    /// Σ h·p, Σ h'·p and Σ p of such a line with both rows of coefficients that are kept.
+    fn both_sums(kernel: Kernel, pixels: &[Self], row: &[i8], second: &[i8]) -> (f32, f32, f32);
     /// The same of a part, and as many columns of the row from `from` on.
     fn part_sums(kernel: Kernel, pixels: &[Self], row: &[i8], from: usize) -> (f32, f32);
     /// Keeps a line for later in a scratch of f32, of which only the bits are used: one for two pixels is
@@ -26,6 +28,11 @@ impl Pixel for u8 {
     fn sums(kernel: Kernel, pixels: &[Self], row: &[i8]) -> (f32, f32) {
         let sums = kernel.kept_u8(pixels, row);
         (sums.product as f32, sums.pixels as f32)
+    }
+    #[inline(always)]
+    fn both_sums(kernel: Kernel, pixels: &[Self], row: &[i8], second: &[i8]) -> (f32, f32, f32) {
+        let (sums, second) = kernel.kept_both_u8(pixels, row, second);
+        (sums.product as f32, second as f32, sums.pixels as f32)
     }
     #[inline(always)]
     fn part_sums(kernel: Kernel, pixels: &[Self], row: &[i8], from: usize) -> (f32, f32) {
@@ -58,6 +65,11 @@ impl Pixel for u16 {
     #[inline(always)]
     fn sums(kernel: Kernel, pixels: &[Self], row: &[i8]) -> (f32, f32) {
         Self::part_sums(kernel, pixels, row, 0)
+    }
+    #[inline(always)]
+    fn both_sums(kernel: Kernel, pixels: &[Self], row: &[i8], second: &[i8]) -> (f32, f32, f32) {
+        let (product, sum) = Self::sums(kernel, pixels, row);
+        (product, Self::sums(kernel, pixels, second).0, sum)
     }
     #[inline(always)]
     fn part_sums(kernel: Kernel, pixels: &[Self], row: &[i8], from: usize) -> (f32, f32) {

@@ -163,6 +163,13 @@ impl Kernel {
         self.kept_part_u8(pixels, row, 0)
     }
 
+    /// [`Kernel::kept_u8`], and Σ h'·p with a second row that is kept.
+    #[inline(always)]
+    pub fn kept_both_u8(self, pixels: &[u8], row: &[i8], second: &[i8]) -> (LineSums, i32) {
+        let sums = self.kept_u8(pixels, row);
+        (sums, self.kept_u8(pixels, second).product)
+    }
+
     /// Sums over pixels and as many columns of a row that is kept, the first of them `from`.
     #[inline(always)]
     pub fn kept_part_u8(self, pixels: &[u8], row: &[i8], from: usize) -> LineSums {

@@ -4,7 +4,10 @@
 //! some columns in the background of each line, while the old coefficients still serve; a whole reference is moved one
 //! row after the other, some columns in the background of each line.
 
-use super::{Build, Parts, RowTable, Store, align::Averaging, build::settle};
+use super::{
+    Build, Parts, RowTable, Store, VerticalBuild, VerticalParts, VerticalTable, align::Averaging,
+    build::settle, planar::place,
+};
 use crate::{camera::pixel::Pixel, kernel::Kernel};
 
 /// What following remembers.
@@ -26,21 +29,30 @@ enum Work {
     /// A line is kept in the scratch: where it was, and the factor that brings it to its reference's brightness.
     Kept {
         row: usize,
-        shift_px: f32,
+        /// To the right and downwards.
+        shift_px: [f32; 2],
         to_reference: f32,
     },
     /// It is averaged into its row; the next column.
     Average {
         row: usize,
         averaging: Averaging,
+        down_px: f32,
         column: usize,
     },
     /// The row's coefficients are built again.
     Build { row: usize, build: Build },
-    /// They are there, with their table, and become what the kernel keeps; the next column.
+    /// Those of its second product are.
+    BuildVertical {
+        row: usize,
+        table: RowTable,
+        build: VerticalBuild,
+    },
+    /// They are there, with their tables, and become what the kernel keeps; the next column.
     Keep {
         row: usize,
         table: RowTable,
+        vertical: Option<VerticalTable>,
         column: usize,
     },
     /// All rows are moved to the right by `by_px`; those from `next` on are still where they were.
@@ -56,13 +68,29 @@ enum Work {
 enum Moving {
     /// Its coefficients are laid where they are to be, among the fresh ones; the next column, and what the kernel
     /// left of those before.
-    Lay { column: usize, lanes: u32 },
+    Lay {
+        column: usize,
+        lanes: u32,
+    },
     /// What went over the ends is made up for.
     Settle,
     /// They become what the kernel keeps; the next column.
-    Keep { column: usize },
+    Keep {
+        column: usize,
+    },
+    /// The same three of its second product.
+    LayVertical {
+        column: usize,
+        lanes: u32,
+    },
+    SettleVertical,
+    KeepVertical {
+        column: usize,
+    },
     /// Its mean is moved; columns that are, from the end that they are moved to.
-    Mean { moved: usize },
+    Mean {
+        moved: usize,
+    },
     /// The coefficients take the place of the row's own.
     Place,
 }
@@ -144,7 +172,7 @@ impl Store<'_> {
         &mut self,
         row: usize,
         pixels: &[P],
-        shift_px: f32,
+        shift_px: [f32; 2],
         to_reference: f32,
         hurried: bool,
     ) {
@@ -172,10 +200,12 @@ impl Store<'_> {
         else {
             return;
         };
+        let [shift_px, down_px] = shift_px;
         let averaging = self.averaging(row, shift_px, to_reference, MEMORY_FRAMES);
         self.background.work = averaging.map_or(Work::Nothing, |averaging| Work::Average {
             row,
             averaging,
+            down_px,
             column: 0,
         });
     }
@@ -192,9 +222,10 @@ impl Store<'_> {
             Work::Average {
                 row,
                 averaging,
+                down_px,
                 column,
             } => {
-                let row = *row;
+                let (row, down_px) = (*row, *down_px);
                 if *column == width {
                     let build = self.build_of(row);
                     self.background.work = Work::Build { row, build };
@@ -205,8 +236,10 @@ impl Store<'_> {
                 let span = *column..column.saturating_add(columns).min(width);
                 *column = span.end;
                 if let Some(mean) = s.mean.get_mut(row * width..(row + 1) * width) {
-                    averaging.some::<P>(span, mean, s.scratch);
+                    averaging.some::<P>(span.clone(), mean, s.scratch);
                 }
+                let keep = self.keep_of(row);
+                self.settle_down(row, span, down_px, keep);
             }
             Work::Build { row, build } => {
                 let span = *row * width..(*row + 1) * width;
@@ -221,37 +254,99 @@ impl Store<'_> {
                     coefficients: s.fresh,
                 };
                 if let Some(table) = build.advance(columns, parts) {
+                    let row = *row;
+                    self.background.work = self.built_first(row, table);
+                }
+            }
+            Work::BuildVertical { row, table, build } => {
+                let Some(v) = &mut s.vertical else {
+                    self.background.work = Work::Nothing;
+                    return 0.0;
+                };
+                let parts = &mut VerticalParts {
+                    picture: s.mean,
+                    row: *row,
+                    mask: s.mask,
+                    first: s.fresh,
+                    scratch: s.scratch,
+                    coefficients: v.fresh,
+                };
+                if let Some(vertical) = build.advance(columns, parts) {
                     self.background.work = Work::Keep {
                         row: *row,
-                        table,
+                        table: *table,
+                        vertical: Some(vertical),
                         column: 0,
                     };
                 }
             }
-            Work::Keep { row, table, column } => {
-                let kernel = self.recipe.kernel;
-                // Two by two.
-                let columns = columns.saturating_mul(2);
-                let span = *column..column.saturating_add(columns).min(width);
-                *column = span.end;
-                kernel.keep_some(s.fresh, span);
-                if *column == width || !kernel.keeps_pairs() {
-                    let span = *row * width..(*row + 1) * width;
-                    if let (Some(coefficients), Some(slot)) =
-                        (s.coefficients.get_mut(span), s.tables.get_mut(*row))
-                    {
-                        coefficients.copy_from_slice(s.fresh);
-                        *slot = *table;
-                    }
-                    self.background.work = Work::Nothing;
-                }
-            }
+            Work::Keep { .. } => self.keep_one_step(columns),
             Work::Move { .. } => {
                 self.move_one_step(row, columns);
                 return self.aside_px(row);
             }
         }
         0.0
+    }
+
+    /// What comes after a row's first product has been built.
+    fn built_first(&self, row: usize, table: RowTable) -> Work {
+        if !self.is_planar() {
+            return Work::Keep {
+                row,
+                table,
+                vertical: None,
+                column: 0,
+            };
+        }
+        let frames = 1.0 / self.keep_of(row);
+        let build = VerticalBuild::new(&self.recipe, frames, table, row, self.rows());
+        Work::BuildVertical { row, table, build }
+    }
+
+    /// Makes some fresh columns what the kernel keeps; at their end they take their row's place.
+    fn keep_one_step(&mut self, columns: usize) {
+        let (kernel, width, rows) = (self.recipe.kernel, self.width, self.rows());
+        let Work::Keep {
+            row,
+            table,
+            vertical,
+            column,
+        } = &mut self.background.work
+        else {
+            return;
+        };
+        let s = &mut self.buffers;
+        // Two by two.
+        let columns = columns.saturating_mul(if vertical.is_some() { 1 } else { 2 });
+        let span = *column
+            ..column
+                .saturating_add(columns)
+                .next_multiple_of(2)
+                .min(width);
+        *column = span.end;
+        kernel.keep_some(s.fresh, span.clone());
+        if let Some(v) = &mut s.vertical {
+            kernel.keep_some(v.fresh, span);
+        }
+        if *column < width && kernel.keeps_pairs() {
+            return;
+        }
+        let span = *row * width..(*row + 1) * width;
+        if let (Some(coefficients), Some(slot)) =
+            (s.coefficients.get_mut(span.clone()), s.tables.get_mut(*row))
+        {
+            coefficients.copy_from_slice(s.fresh);
+            *slot = *table;
+            if let (Some(v), &mut Some(built)) = (&mut s.vertical, vertical)
+                && let (Some(coefficients), Some(vertical)) =
+                    (v.coefficients.get_mut(span), v.tables.get_mut(*row))
+            {
+                coefficients.copy_from_slice(v.fresh);
+                place(&self.recipe, [*row, rows], built, vertical, slot);
+            }
+        }
+        self.background.work = Work::Nothing;
     }
 
     /// Moves some columns of a row, in the background of the line of row `during`; a whole one where a line may take what it likes.
@@ -271,15 +366,22 @@ impl Store<'_> {
         let s = &mut self.buffers;
         let (Some(mean), Some(coefficients), Some(table)) = (
             s.mean.get_mut(row.clone()),
-            s.coefficients.get_mut(row),
+            s.coefficients.get_mut(row.clone()),
             s.tables.get_mut(*next),
         ) else {
             self.background.work = Work::Nothing;
             return;
         };
+        let mut vertical = s.vertical.as_mut().and_then(|v| {
+            let row = v.coefficients.get_mut(row)?;
+            Some((row, &mut *v.fresh, v.tables.get_mut(*next)?))
+        });
         let at_once = columns >= width;
         if at_once && !kernel.keeps_pairs() {
             move_row(coefficients, *by_px);
+            if let Some((coefficients, ..)) = &mut vertical {
+                move_row(coefficients, *by_px);
+            }
             *moving = Moving::Mean { moved: 0 };
         }
         loop {
@@ -308,9 +410,51 @@ impl Store<'_> {
                     let span = *column..column.saturating_add(columns).min(width);
                     *column = span.end;
                     if span.end == width {
-                        *moving = Moving::Mean { moved: 0 };
+                        *moving = match vertical.is_some() {
+                            true => Moving::LayVertical {
+                                column: 0,
+                                lanes: 0,
+                            },
+                            false => Moving::Mean { moved: 0 },
+                        };
                     }
                     kernel.keep_some(s.fresh, span);
+                }
+                Moving::LayVertical { column, lanes } => {
+                    let Some((coefficients, fresh, _)) = &mut vertical else {
+                        *moving = Moving::Mean { moved: 0 };
+                        return;
+                    };
+                    if *column == 0 {
+                        fresh.fill(0);
+                    }
+                    let columns = columns.saturating_mul(LAID);
+                    let span = *column..column.saturating_add(columns).min(width);
+                    *column = span.end;
+                    let ended = span.end == width;
+                    kernel.lay_kept(coefficients, span, lanes, fresh, *by_px);
+                    if ended {
+                        *moving = Moving::SettleVertical;
+                    }
+                }
+                Moving::SettleVertical => {
+                    if let Some((_, fresh, table)) = &mut vertical
+                        && !settle_ends(kernel, fresh)
+                    {
+                        **table = table.without_texture();
+                    }
+                    *moving = Moving::KeepVertical { column: 0 };
+                }
+                Moving::KeepVertical { column } => {
+                    let columns = columns.saturating_mul(LAID);
+                    let span = *column..column.saturating_add(columns).min(width);
+                    *column = span.end;
+                    if span.end == width {
+                        *moving = Moving::Mean { moved: 0 };
+                    }
+                    if let Some((_, fresh, _)) = &mut vertical {
+                        kernel.keep_some(fresh, span);
+                    }
                 }
                 Moving::Mean { moved } if at_once => {
                     move_row(mean, *by_px);
@@ -334,6 +478,9 @@ impl Store<'_> {
                 Moving::Place => {
                     if !at_once || kernel.keeps_pairs() {
                         coefficients.copy_from_slice(s.fresh);
+                        if let Some((coefficients, fresh, _)) = &mut vertical {
+                            coefficients.copy_from_slice(fresh);
+                        }
                     }
                     *next += 1;
                     *moving = Moving::BEGIN;

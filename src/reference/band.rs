@@ -28,7 +28,7 @@ pub enum Level {
 pub const MAX_HALF: usize = 5;
 
 /// The central difference of tenth order, right half.
-const DERIVATIVE: [f32; 5] = [
+pub(crate) const DERIVATIVE: [f32; 5] = [
     5.0 / 6.0,
     -5.0 / 21.0,
     5.0 / 84.0,

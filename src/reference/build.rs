@@ -3,11 +3,15 @@
 //! A board must not spend a whole row's work in one line time, so the work is a small state machine:
 //! [`Build::advance`] does the next few columns of the present step. On a desktop one call does all.
 
+mod vertical;
+
 use super::align::UNKNOWN_STEPS;
 use super::band::{HALFWAY, MAX_HALF, SLOPE};
 use super::{Recipe, RowTable, Two, at_least_1};
 use crate::kernel::{Kernel, Wide};
 use core::ops::Range;
+
+pub use vertical::{VerticalBuild, VerticalParts};
 
 /// Rows whose shift is less sure than this are not used, px.
 const WORST_SD_PX: f32 = 0.4;
@@ -178,7 +182,8 @@ impl Build {
                 Step::DropNoise
             }
             Step::DropNoise => {
-                self.drop_noise(span, parts.mean, w, h);
+                let half = self.recipe.level.half_filter();
+                self.drop_noise(half, span, parts.mean, w, h);
                 Step::Balance
             }
             Step::Balance => {
@@ -304,10 +309,16 @@ impl Build {
     }
 
     /// Where the reference's slope is no larger than its own noise it says nothing and would only let the
-    /// line's noise in: a Wiener gain by the energy of nine columns.
+    /// line's noise in: a Wiener gain by the energy of nine columns. `half`: the right half of the slope's filter.
     #[cfg_attr(target_arch = "x86_64", inline(always))]
-    fn drop_noise(&mut self, span: Range<usize>, mean: &[u16], w: &mut [f32], h: &mut [f32]) {
-        let half = self.recipe.level.half_filter();
+    fn drop_noise(
+        &mut self,
+        half: &[f32],
+        span: Range<usize>,
+        mean: &[u16],
+        w: &mut [f32],
+        h: &mut [f32],
+    ) {
         let filter_power = 2.0 * half.iter().map(|f| f * f).sum::<f32>() / self.frames;
         let threshold = filter_power * ENERGY_COLUMNS as f32;
         if span.start == 0 {
@@ -382,6 +393,17 @@ impl Build {
         self.largest = f32::from_bits(largest);
     }
 
+    /// What h is multiplied by to fill what a coefficient may be.
+    #[inline(always)]
+    fn scale(&self) -> f32 {
+        let limit = f32::from(self.recipe.kernel.most_kept() - 1);
+        if self.largest > 0.0 && self.largest.is_finite() {
+            limit / self.largest
+        } else {
+            0.0
+        }
+    }
+
     /// h scaled to whole numbers. Each rounding error is carried on to the next pixel, which keeps the
     /// errors out of the texture's band.
     #[cfg_attr(target_arch = "x86_64", inline(always))]
@@ -395,12 +417,7 @@ impl Build {
     ) {
         let kernel = self.recipe.kernel;
         let most = kernel.most_kept();
-        let limit = f32::from(most - 1);
-        let scale = if self.largest > 0.0 && self.largest.is_finite() {
-            limit / self.largest
-        } else {
-            0.0
-        };
+        let scale = self.scale();
         let (Some(mean), Some(w), Some(h), Some(coefficients)) = (
             mean.get(span.clone()),
             w.get(span.clone()),
@@ -487,20 +504,25 @@ impl Build {
             (value - q[LAGS]) / slope
         };
         let (right, left) = (half(LAGS), half(LAGS - 1));
-        // ± stride/2 = u + A·u² + B·u³ at both.
-        let (a, b) = if right > 0.0 && left < 0.0 {
-            let right_error = (0.5 * stride - right) / (right * right);
-            let left_error = (-0.5 * stride - left) / (left * left);
-            let b = (right_error - left_error) / (right - left);
-            (right_error - b * right, b)
-        } else {
-            (0.0, 0.0)
-        };
+        let (a, b) = inverse(right, left, stride);
         table.px_per_product = 1.0 / slope;
         table.information_and_offset = Two::new(information, q[LAGS] / slope);
-        // A texture of single pixels has no more.
-        table.quadratic_and_cubic = Two::new(a.clamp(-2.0, 2.0), b.clamp(-4.0, 4.0));
+        table.quadratic_and_cubic = Two::new(a, b);
         table
+    }
+}
+
+/// A and B of ±stride/2 = u + A·u² + B·u³ at both, from u at half a step either way.
+fn inverse(right: f32, left: f32, stride: f32) -> (f32, f32) {
+    if right > 0.0 && left < 0.0 {
+        let right_error = (0.5 * stride - right) / (right * right);
+        let left_error = (-0.5 * stride - left) / (left * left);
+        let b = (right_error - left_error) / (right - left);
+        // A texture of single pixels has no more.
+        let a = right_error - b * right;
+        (a.clamp(-2.0, 2.0), b.clamp(-4.0, 4.0))
+    } else {
+        (0.0, 0.0)
     }
 }
 

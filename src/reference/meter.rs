@@ -2,8 +2,8 @@
 
 use core::hint::select_unpredictable;
 
-use super::Recipe;
 use super::noise::PixelNoise;
+use super::{Beside, Recipe};
 use crate::camera::pixel::Pixel;
 
 /// Measures the noise of pixels against their brightness, from what lines leave over when their
@@ -17,11 +17,13 @@ pub struct NoiseMeter {
 const BINS: usize = 8;
 
 impl NoiseMeter {
-    /// Adds what one line leaves over. `shift_px`: of the line against `mean`; `gain`: its brightness
-    /// against it; `frames`: how many frames `mean` is the mean of.
+    /// Adds what one line leaves over. `beside`: the rows next to `mean`, where the line is displaced along the columns;
+    /// `shift_px`: of the line against `mean`; `gain`: its brightness against it; `frames`: how many frames `mean` is the mean of.
+    #[expect(clippy::too_many_arguments)]
     pub(crate) fn add_line<P: Pixel>(
         &mut self,
         mean: &[u16],
+        beside: Option<Beside<'_>>,
         pixels: &[P],
         shift_px: f32,
         gain: f32,
@@ -48,7 +50,7 @@ impl NoiseMeter {
             return;
         };
         let columns = mean.windows(2 * stride + 1).step_by(3);
-        for (around, p) in columns.zip(pixels.iter().step_by(3)) {
+        for (k, (around, p)) in columns.zip(pixels.iter().step_by(3)).enumerate() {
             let &[left, .., right] = around else { return };
             let here = around.get(stride).copied().unwrap_or(0);
             let (left, here, right) = (
@@ -59,7 +61,11 @@ impl NoiseMeter {
             let slope = (right - left) * per_px;
             // On a steep edge what is left over is the shift's error, not the pixel's noise.
             let steep = slope * slope > recipe.noise.variance(here) * 16.0;
-            let residual = f32::from(p.value()) - gain * (here - near * slope);
+            let mut model = here - near * slope;
+            if let Some(beside) = &beside {
+                model -= beside.less(first + 3 * k, here / value) * value;
+            }
+            let residual = f32::from(p.value()) - gain * model;
             // What does not count goes to a bin of its own: a branch would be foreseen half of the time.
             let bin = select_unpredictable(
                 steep | (here >= recipe.saturation),

@@ -23,23 +23,27 @@ mod build;
 mod learned;
 mod meter;
 pub mod noise;
+mod planar;
 mod recipe;
 mod round;
 mod storage;
 mod store;
+mod vertical;
 
 #[cfg(feature = "long-exposure")]
 use band::{Level, SLOPE};
 
-pub use build::{Build, Parts};
+pub use build::{Build, Parts, VerticalBuild, VerticalParts};
 pub use learned::{ColumnLearning, RowLearning};
 pub use meter::NoiseMeter;
+pub(crate) use planar::Beside;
 pub use recipe::Recipe;
 pub(crate) use storage::BufferTooShort;
-pub use storage::{StaticStorage, Storage};
+pub use storage::{StaticStorage, StaticVerticalStorage, Storage, VerticalStorage};
 pub(crate) use store::Store;
+pub use vertical::VerticalTable;
 
-/// What the line path needs of a row besides its coefficients: 16 bytes.
+/// What the line path needs of a row besides its coefficients: 16 bytes. [`VerticalTable`] is that of its second ones.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct RowTable {
@@ -131,6 +135,24 @@ impl RowTable {
         let (quadratic, cubic) = self.inverse();
         let u = product * self.px_per_product - self.information_and_offset.second();
         u * (1.0 + u * (quadratic + u * cubic))
+    }
+
+    /// The same for a line that, being displaced along the columns, reads `lean_px` too large.
+    #[inline(always)]
+    pub(crate) fn shift_of_leaning_px(&self, product: f32, lean_px: f32) -> f32 {
+        let (quadratic, cubic) = self.inverse();
+        let u = product * self.px_per_product - (self.information_and_offset.second() + lean_px);
+        u * (1.0 + u * (quadratic + u * cubic))
+    }
+
+    /// What a lean of so many px adds to a product.
+    #[inline(always)]
+    pub(crate) fn product_of_lean(&self, lean_px: f32) -> f32 {
+        if lean_px == 0.0 {
+            0.0
+        } else {
+            lean_px / self.px_per_product
+        }
     }
 
     /// The same for a line that is smeared out along x by `variance_px2` more than its reference, with a

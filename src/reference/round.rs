@@ -54,7 +54,7 @@ impl Store<'_> {
             self.recipe.level = level;
             let mut information = 0.0;
             for row in (0..rows).step_by(step) {
-                self.build(row);
+                self.build_first(row);
                 let table = self.buffers.tables.get(row);
                 information += table.map_or(0.0, RowTable::information_per_px2);
             }

@@ -41,6 +41,10 @@ impl<'a> Store<'a> {
         self.buffers.tables.fill(RowTable::default());
         self.buffers.coefficients.fill(0);
         self.buffers.columns.fill(super::ColumnLearning::default());
+        if let Some(v) = &mut self.buffers.vertical {
+            v.tables.fill(super::VerticalTable::default());
+            v.coefficients.fill(0);
+        }
     }
 
     /// How rows become coefficients.
@@ -104,13 +108,13 @@ impl<'a> Store<'a> {
         self.buffers.learning.get_mut(row)
     }
 
-    /// Averages a line into its row, of at most `memory` frames. `shift_px`: of the line against the row;
+    /// Averages a line into its row, of at most `memory` frames. `shift_px`: of the line against the row, and downwards;
     /// `to_reference`: the factor that brings it to the row's brightness.
     pub(crate) fn average<P: Pixel>(
         &mut self,
         row: usize,
         pixels: &[P],
-        shift_px: f32,
+        [shift_px, down_px]: [f32; 2],
         to_reference: f32,
         memory: u16,
     ) {
@@ -121,6 +125,14 @@ impl<'a> Store<'a> {
         if let Some(mean) = self.buffers.mean.get_mut(row * width..(row + 1) * width) {
             averaging.all(self.recipe.kernel, mean, pixels);
         }
+        let keep = self.keep_of(row);
+        self.settle_down(row, 0..width, down_px, keep);
+    }
+
+    /// Share of the frame that was averaged last in its row.
+    pub(super) fn keep_of(&self, row: usize) -> f32 {
+        let learning = self.buffers.learning.get(row);
+        1.0 / f32::from(learning.map_or(1, RowLearning::frames))
     }
 
     /// How a line is to be averaged into its row; the row is counted to have seen it.
@@ -156,8 +168,19 @@ impl<'a> Store<'a> {
         Build::new(&self.recipe, f32::from(frames))
     }
 
-    /// Builds a row's coefficients from its mean, in one go.
+    /// Builds a row's coefficients from its mean, in one go, and those of its second product from the rows beside it.
     pub(crate) fn build(&mut self, row: usize) {
+        self.build_first(row);
+        self.build_vertical(row);
+        let width = self.width;
+        let coefficients = &mut self.buffers.coefficients;
+        if let Some(coefficients) = coefficients.get_mut(row * width..(row + 1) * width) {
+            self.recipe.kernel.keep_some(coefficients, 0..width);
+        }
+    }
+
+    /// A row's coefficients as they are, which the kernel does not keep yet.
+    pub(super) fn build_first(&mut self, row: usize) {
         let build = self.build_of(row);
         let width = self.width;
         let span = row * width..(row + 1) * width;
@@ -173,7 +196,6 @@ impl<'a> Store<'a> {
                 scratch: b.scratch,
                 coefficients,
             });
-            self.recipe.kernel.keep_some(coefficients, 0..width);
             *slot = table;
         }
     }
@@ -194,7 +216,7 @@ impl<'a> Store<'a> {
 
 /// A row of a buffer that holds one row after the other.
 #[inline(always)]
-fn part<T>(buffer: &[T], row: usize, width: usize) -> Option<&[T]> {
+pub(super) fn part<T>(buffer: &[T], row: usize, width: usize) -> Option<&[T]> {
     let first = row * width;
     buffer.get(first..first + width)
 }

@@ -158,7 +158,8 @@ impl Tracker<'_> {
         smear: Smear,
     ) -> Option<f32> {
         let (whole, product) = nearest_product(&self.store, row, pixels, shift_px)?;
-        let product = product * self.light.to_reference;
+        let lean = table.product_of_lean(self.correlator.lean_px);
+        let product = product * self.light.to_reference - lean;
         let near = table.shift_of_smeared_px(product, smear.variance_px2, smear.skew_px3);
         let unsmeared_px = whole as f32 + near;
         // A correction beyond this is no correction: the expansion does not hold, or the speed is wrong.

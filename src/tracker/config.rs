@@ -7,6 +7,18 @@ use crate::{
 };
 use core::fmt;
 
+/// Along which axes motion is measured.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Axes {
+    /// Along the rows alone. What moves along the columns leaks in where edges lean.
+    #[default]
+    X,
+    /// Along rows and columns ([`Vertical`](crate::timeline::Vertical)). Takes the memory of
+    /// [`Storage::vertical`] and about half as long again; pictures of ten rows and more, as two rows of each colour at either
+    /// end are not measured.
+    Xy,
+}
+
 /// How a tracker is to work. Plain data, checked by [`Tracker::new`](super::Tracker::new).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Config {
@@ -20,6 +32,8 @@ pub struct Config {
     pub bits: u8,
     /// Pixels from one to the next of the same colour: 1 for luma, 2 for raw Bayer.
     pub stride: u8,
+    /// Along which axes it measures.
+    pub axes: Axes,
     /// Frames in each of the two rounds of learning, at least 1.
     pub learn_frames: u16,
     /// How coarse the band is; `None` chooses by the information that the picture holds.
@@ -46,6 +60,7 @@ impl Config {
             rows: timing.rows(),
             bits: 8,
             stride: 1,
+            axes: Axes::X,
             learn_frames: 30,
             level: None,
             search_px: 48,
@@ -115,7 +130,7 @@ impl Config {
             return Err(ConfigError::LearnFrames);
         }
         let (width, rows) = (usize::from(self.width), usize::from(self.rows));
-        let cut = storage.cut(width, rows);
+        let cut = storage.cut(width, rows, self.axes == Axes::Xy);
         cut.map_err(|BufferTooShort { name, has, needs }| ConfigError::Buffer { name, has, needs })
     }
 }

@@ -33,6 +33,9 @@ pub(super) struct Correlator {
     pub(super) near_px: f32,
     /// Inner products that this line has taken beyond the first where it had moved by whole pixels; a check counts as two.
     pub(super) products: u8,
+    /// How much this line's displacement along the columns adds to what its first product reads, px; 0 where the rows alone
+    /// are measured.
+    pub(super) lean_px: f32,
 }
 
 /// Σ h·p and Σ p of a line, where they were taken.
@@ -50,6 +53,7 @@ impl Correlator {
             here_px: 0.5 * f32::from(stride),
             near_px: NEAR_WHILE_LEARNING_PX * f32::from(stride),
             products: 0,
+            lean_px: 0.0,
         }
     }
 
@@ -85,7 +89,7 @@ impl Correlator {
                 return Err(Unfound::NoNumber);
             };
             light.to_reference = table.factor_to_reference(sum);
-            let near = table.shift_px(product * light.to_reference);
+            let near = table.shift_of_leaning_px(product * light.to_reference, self.lean_px);
             if near.abs() <= self.near_px {
                 return Ok(near);
             }
@@ -147,7 +151,7 @@ impl Correlator {
             let unseen = store.recipe().kernel.light(from, mean.get(overlap.unseen)?);
             let seen = table.pixel_sum() - unseen as f32 / store.recipe().counts_per_value;
             light.to_reference = at_least_1(seen) / at_least_1(sum);
-            let near = table.shift_px(product * light.to_reference);
+            let near = table.shift_of_leaning_px(product * light.to_reference, self.lean_px);
             shift_px = whole as f32 + near;
             let next = (whole + steps(near.clamp(-4.0, 4.0))).clamp(-limit, limit);
             converged = near.abs() <= self.near_px || next == whole;

@@ -1,7 +1,8 @@
 //! Learning the reference, in two rounds of frames.
 
 use super::{
-    Place, Rejected, Stage, Tracker, check::Check, correlate::Correlator, predict::Prediction,
+    Place, Planar, Rejected, Stage, Tracker, check::Check, correlate::Correlator,
+    predict::Prediction,
 };
 use crate::{
     camera::pixel::Pixel,
@@ -32,6 +33,7 @@ impl Tracker<'_> {
         self.curvature = Curvature::default();
         self.correlator = Correlator::learning(self.config.stride);
         self.blur.relearn();
+        self.planar = Planar::default();
         #[cfg(feature = "long-exposure")]
         self.paths.relearn();
         self.meter = NoiseMeter::default();
@@ -53,6 +55,7 @@ impl Tracker<'_> {
                 self.settle_margin();
                 self.store.even_light();
                 self.store.centre_rows();
+                self.store.centre_rows_down();
                 if self.config.level.is_none() {
                     self.store.choose_level();
                 }
@@ -76,6 +79,10 @@ impl Tracker<'_> {
             Stage::Tracking => {}
         }
         self.prediction.end_round(self.store.usual_information());
+        if self.store.is_planar() {
+            self.planar.end_round(self.store.usual_curvatures_per_px2());
+            self.correlator.lean_px = 0.0;
+        }
         #[cfg(feature = "long-exposure")]
         if self.paths.smear() {
             self.prediction.expect_far();
@@ -133,15 +140,18 @@ impl Tracker<'_> {
         if textured && row % NOISE_ROWS == self.frames_in_stage as usize % NOISE_ROWS {
             self.measure_noise(row, pixels, shift_px, seen.frames);
         }
+        let down_px = self.planar.down_px();
+        let place_px = [shift_px, down_px];
         self.store
-            .average(row, pixels, shift_px, self.light.to_reference, u16::MAX);
+            .average(row, pixels, place_px, self.light.to_reference, u16::MAX);
         if self.stage == Stage::Rough {
             let frames = seen.frames.saturating_add(1);
             if let Some(l) = self.store.learning_mut(row) {
                 l.shift_px += (shift_px - l.shift_px) / f32::from(frames);
             }
+            self.store.note_down(row, down_px, f32::from(frames));
             // A better reference at once, then ever more rarely: the work must stay small.
-            if matches!(frames, 1 | 4 | 16) {
+            if matches!(frames, 1 | 4 | 16) && !self.store.is_planar() {
                 self.store.build(row);
             }
         }
@@ -161,6 +171,7 @@ impl Tracker<'_> {
             let frames = f32::from(frames);
             self.meter.add_line(
                 mean,
+                self.store.beside(row, self.planar.down_px()),
                 pixels,
                 shift_px,
                 1.0 / self.light.to_reference,

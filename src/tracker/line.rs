@@ -9,7 +9,7 @@ use super::{
     correlate::{Sums, Unfound, whole_sums},
     predict::Prediction,
     row::{Row, Scattered, Summed},
-    schedule::FastPath,
+    schedule::{FastPath, FastRows},
 };
 use crate::{
     camera::pixel::Pixel,
@@ -27,7 +27,7 @@ const JUMP_PX: f32 = 1.0;
 const PRODUCTS_OF_A_CHECK: u8 = 2;
 
 /// Where a line is against the reference, and what it knows of that.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Place {
     /// Where the reference has been moved to ([`Store::anchor_px`](crate::reference::Store::anchor_px)) comes on top.
     pub(super) shift_px: f32,
@@ -122,6 +122,9 @@ impl Tracker<'_> {
         mut pixels: R,
         sums: Sums,
     ) -> Result<Place, Rejected> {
+        if let Some(place) = self.take_fast_planar(line, &pixels, true) {
+            return Ok(place);
+        }
         match self.take_with_background(line, &mut pixels, sums, true) {
             Ok(place) => Ok(place),
             Err(sums) => self.take_slow(line, pixels, sums),
@@ -137,10 +140,16 @@ impl Tracker<'_> {
         sums: Sums,
         binner: &mut Binner,
     ) -> Option<Sample> {
+        if self.take_fast_planar(line, &pixels, false).is_some() {
+            return self.pass_on_planar(line, binner);
+        }
         let place = match self.take_with_background(line, &mut pixels, sums, false) {
             Ok(place) => place,
             Err(sums) => self.take_slow(line, pixels, sums).ok()?,
         };
+        if self.store.is_planar() {
+            return self.pass_on_planar(line, binner);
+        }
         self.pass_on(line, place, self.curvature(), binner)
     }
 
@@ -328,6 +337,13 @@ impl Tracker<'_> {
             },
             background_until_row: if at_rest { rows as u16 } else { 0 },
         };
+        if self.store.is_planar() {
+            self.planar.fast = FastRows {
+                frame,
+                until_row: self.schedule.fast_path.until_row,
+            };
+            self.schedule.fast_path.end();
+        }
     }
 
     /// The background job of a line, where there is one. Returns by how much the row's reference lies to
@@ -374,6 +390,12 @@ impl Tracker<'_> {
         if self.stage == Stage::Rough && self.frames_in_stage.is_power_of_two() {
             self.settle_noise();
         }
+        // The rows beside a row must have been seen before its second product can be built.
+        let seen = self.frames_in_stage;
+        if self.store.is_planar() && self.stage == Stage::Rough && matches!(seen, 1 | 4 | 16) {
+            self.store.build_all();
+            self.planar.end_round(self.store.usual_curvatures_per_px2());
+        }
         self.frames_in_stage = self.frames_in_stage.saturating_add(1);
         self.frame = Some(frame);
         self.schedule.turn = match self.stage {
@@ -405,11 +427,20 @@ impl Tracker<'_> {
             return Err(Rejected::NoTexture);
         };
         if !table.has_texture() {
+            if self.store.is_planar() {
+                let found = self.locate_down(row, &table, pixels, aside_px);
+                if found != Err(Rejected::NoTexture) {
+                    return found;
+                }
+            }
             self.note_light(row, &table, pixels);
             return Err(Rejected::NoTexture);
         }
         let information_per_px2 = table.information_per_px2();
         let expected = self.prediction.at(row) + aside_px;
+        if self.store.is_planar() {
+            self.begin_planar(row, pixels.pixels(), expected);
+        }
         let before = self.light.to_reference;
         let mut shift_px = match self.correlate(row, pixels, expected, sums) {
             Ok(shift_px) => shift_px,
@@ -445,6 +476,9 @@ impl Tracker<'_> {
         }
         if self.prediction.is_swift() && aside_px == 0.0 {
             shift_px = self.unsmear(row, &table, pixels.pixels(), shift_px);
+        }
+        if self.store.is_planar() {
+            shift_px = self.measure_down(row, &table, pixels.pixels(), shift_px, aside_px)?;
         }
         shift_px -= aside_px;
         if jumped {
@@ -506,13 +540,14 @@ impl Tracker<'_> {
     }
 
     /// `checked`: the shift of a line that was found to fit.
-    fn after_check<P: Pixel>(&mut self, row: usize, pixels: &[P], checked: Option<f32>) {
+    pub(super) fn after_check<P: Pixel>(&mut self, row: usize, pixels: &[P], checked: Option<f32>) {
         if let Some(shift_px) = checked
             && self.schedule.turn == row
         {
             let hurried = self.is_hurried();
+            let place_px = [shift_px, self.planar.down_px()];
             self.store
-                .follow_row(row, pixels, shift_px, self.light.to_reference, hurried);
+                .follow_row(row, pixels, place_px, self.light.to_reference, hurried);
         }
         self.schedule.next_check = self.check.next_due(row, self.is_hurried());
         if self.schedule.turn > row {

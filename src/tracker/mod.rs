@@ -21,6 +21,7 @@ mod line;
 mod overlap;
 #[cfg(feature = "long-exposure")]
 mod path;
+mod planar;
 mod predict;
 mod residual;
 mod row;
@@ -29,13 +30,17 @@ mod search;
 #[cfg(test)]
 mod tests;
 
-pub use crate::reference::{ColumnLearning, RowLearning, StaticStorage, Storage};
-pub use config::{Config, ConfigError};
+pub use crate::reference::{
+    ColumnLearning, RowLearning, StaticStorage, StaticVerticalStorage, Storage, VerticalStorage,
+};
+pub use config::{Axes, Config, ConfigError};
 pub use counts::Counts;
 
 use crate::{
     camera::{Line, Pixels, UpperBytes},
-    reference::{NoiseMeter, Recipe, RowTable, Store, band::Level, noise::PixelNoise},
+    reference::{
+        NoiseMeter, Recipe, RowTable, Store, VerticalTable, band::Level, noise::PixelNoise,
+    },
     timeline::{Begin, Binner, Curvature, Displacement, RowShift, Sample},
 };
 use blur::Blur;
@@ -43,6 +48,7 @@ use check::Check;
 use correlate::Correlator;
 use light::Light;
 use line::{Place, Rejected};
+use planar::Planar;
 use predict::Prediction;
 use row::Row;
 use schedule::Schedule;
@@ -86,6 +92,7 @@ pub struct Tracker<'a> {
     prediction: Prediction,
     light: Light,
     blur: Blur,
+    planar: Planar,
     #[cfg(feature = "long-exposure")]
     paths: path::Paths,
     meter: NoiseMeter,
@@ -130,6 +137,7 @@ impl<'a> Tracker<'a> {
             prediction: Prediction::default(),
             light: Light::new(&config.timing),
             blur: Blur::new(&config.timing),
+            planar: Planar::default(),
             #[cfg(feature = "long-exposure")]
             paths: path::Paths::new(
                 &config.timing,
@@ -175,6 +183,11 @@ impl<'a> Tracker<'a> {
     /// The rows' tables, one a row.
     pub fn tables(&self) -> &[RowTable] {
         self.store.tables()
+    }
+
+    /// What the rows know of the motion along the columns, one a row; none with [`Axes::X`].
+    pub fn vertical_tables(&self) -> &[VerticalTable] {
+        self.store.vertical_tables()
     }
 
     /// Curvature of the rows, mean by information: what a fast tone's amplitude needs, told with every sample. 0 while
@@ -280,13 +293,18 @@ impl<'a> Tracker<'a> {
 
     #[inline(always)]
     fn outcome(&self, line: &Line<'_>, place: Result<Place, Rejected>) -> Outcome {
+        let time_ns = || {
+            let delay_ns = self.light.delay_ns().unwrap_or(0.0) as i32;
+            self.middle_ns(line).wrapping_add(i64::from(delay_ns))
+        };
         match place {
+            Ok(_) if self.store.is_planar() => {
+                Outcome::Measured(self.planar_displacement(line, time_ns()))
+            }
             Ok(place) => Outcome::Measured(Displacement {
                 frame: line.frame,
                 row: line.row,
-                time_ns: self
-                    .middle_ns(line)
-                    .wrapping_add(i64::from(self.light.delay_ns().unwrap_or(0.0) as i32)),
+                time_ns: time_ns(),
                 shift_px: place.shift_px + self.store.anchor_px(),
                 information_per_px2: place.information_per_px2,
                 vertical: None,

@@ -20,13 +20,13 @@ impl Residual {
         (self.power - 2.0).max(0.0) / self.slope_power.max(1e-9)
     }
 
-    /// What is left of a line of `row` at `shift_px` when its shifted reference is taken off. `to_reference`: the factor
+    /// What is left of a line of `row` that is shifted to the right and downwards when its shifted reference is taken off. `to_reference`: the factor
     /// that brings it to its reference's brightness; about so many `columns` are read.
     pub(super) fn of<P: Pixel>(
         store: &Store<'_>,
         row: usize,
         pixels: &[P],
-        shift_px: f32,
+        [shift_px, down_px]: [f32; 2],
         to_reference: f32,
         columns: usize,
     ) -> Option<Self> {
@@ -37,6 +37,7 @@ impl Residual {
         let whole = nearest_step(shift_px, stride);
         let near = shift_px - whole as f32;
         let overlap = Overlap::new(width, whole)?;
+        let (first, beside) = (overlap.reference.start, store.beside(row, down_px));
         let (mean, mask) = (
             mean.get(overlap.reference.clone())?,
             store.mask().get(overlap.reference)?,
@@ -80,7 +81,10 @@ impl Residual {
             }
             let slope = right - left;
             let bend = right + left - 2.0 * here;
-            let model = here - 0.5 * near * (slope - near * bend);
+            let mut model = here - 0.5 * near * (slope - near * bend);
+            if let Some(beside) = &beside {
+                model -= beside.less(first + from + x, here);
+            }
             let residual = f32::from(p.value()) - gain * model;
             let variance = r.noise.dark + per_count * here;
             let weight = 1.0

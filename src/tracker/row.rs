@@ -8,6 +8,8 @@ pub(super) trait Summed {
     fn len(&self) -> usize;
     /// Σ h·p and Σ p of all of them, as [`Pixel::sums`].
     fn sums(&self, kernel: Kernel, row: &[i8]) -> (f32, f32);
+    /// Σ h·p, Σ h'·p and Σ p, as [`Pixel::both_sums`].
+    fn both_sums(&self, kernel: Kernel, row: &[i8], second: &[i8]) -> (f32, f32, f32);
 }
 
 /// The pixels of a line.
@@ -26,6 +28,10 @@ impl<P: Pixel> Summed for &[P] {
     #[inline(always)]
     fn sums(&self, kernel: Kernel, row: &[i8]) -> (f32, f32) {
         P::sums(kernel, self, row)
+    }
+    #[inline(always)]
+    fn both_sums(&self, kernel: Kernel, row: &[i8], second: &[i8]) -> (f32, f32, f32) {
+        P::both_sums(kernel, self, row, second)
     }
 }
 
@@ -70,6 +76,11 @@ impl Summed for UpperBytes<'_> {
         let sums = UpperBytes::sums(self, kernel, row);
         (sums.product as f32, sums.pixels as f32)
     }
+    #[inline(always)]
+    fn both_sums(&self, kernel: Kernel, row: &[i8], second: &[i8]) -> (f32, f32, f32) {
+        let (product, pixels) = Summed::sums(self, kernel, row);
+        (product, Summed::sums(self, kernel, second).0, pixels)
+    }
 }
 
 impl Summed for Scattered<'_> {
@@ -78,6 +89,9 @@ impl Summed for Scattered<'_> {
     }
     fn sums(&self, kernel: Kernel, row: &[i8]) -> (f32, f32) {
         Summed::sums(&self.upper, kernel, row)
+    }
+    fn both_sums(&self, kernel: Kernel, row: &[i8], second: &[i8]) -> (f32, f32, f32) {
+        Summed::both_sums(&self.upper, kernel, row, second)
     }
 }
 

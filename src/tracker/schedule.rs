@@ -1,5 +1,7 @@
 //! What the next line is in for, settled by the line before.
 
+use crate::camera::Line;
+
 /// Which lines take the fast path: rows of this frame below this one.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct FastPath {
@@ -14,6 +16,20 @@ impl FastPath {
     pub(super) fn end(&mut self) {
         self.until_row = 0;
         self.background_until_row = 0;
+    }
+}
+
+/// Rows of a frame that take the fast path where both axes are measured.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct FastRows {
+    pub(super) frame: u32,
+    pub(super) until_row: u16,
+}
+
+impl FastRows {
+    #[inline(always)]
+    pub(super) fn has(&self, line: &Line<'_>) -> bool {
+        line.row < self.until_row && line.frame == self.frame
     }
 }
 

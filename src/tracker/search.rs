@@ -79,7 +79,8 @@ impl Tracker<'_> {
         let moved = self.correlator.products > 0;
         let columns = self.check.columns(self.stage, hurried, moved);
         let to_reference = self.light.to_reference;
-        Residual::of(&self.store, row, pixels, shift_px, to_reference, columns)
+        let place_px = [shift_px, self.planar.down_px()];
+        Residual::of(&self.store, row, pixels, place_px, to_reference, columns)
     }
 
     /// Where the next line is searched for while nothing fits, px: outwards from the usual place as by

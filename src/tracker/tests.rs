@@ -304,7 +304,7 @@ fn a_shift_beyond_all_bounds_overflows_nothing() {
                     assert!(shift_px.abs() <= WIDTH as f32);
                 }
                 assert!(tracker.residual(3, &line, huge).is_none());
-                tracker.store.follow_row(3, &line, huge, 1.0, false);
+                tracker.store.follow_row(3, &line, [huge, 0.0], 1.0, false);
                 tracker.measure_noise(3, &line, huge, 9);
             }
         }

@@ -135,7 +135,8 @@ impl Tracker<'_> {
         let width = pixels.len();
         let stride = f32::from(self.config.stride);
         let (whole, product) = nearest_product(&self.store, row, pixels, shift_px)?;
-        let product = product * self.light.to_reference;
+        let lean = table.product_of_lean(self.correlator.lean_px);
+        let product = product * self.light.to_reference - lean;
         let mut q = self.correlation_function(row, width)?;
         self.paths.note_repetition(&q);
         if self.stage == Stage::Tracking {

@@ -43,6 +43,7 @@ impl TrackerMemory {
             columns: &mut self.columns,
             fresh: &mut self.fresh,
             scratch: &mut self.scratch,
+            vertical: None,
         }
     }
 }

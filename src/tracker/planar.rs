@@ -1,0 +1,303 @@
+//! Both axes from every row.
+//!
+//! A row that moves by (x, y) answers its first inner product by x + κ·y and its second by y ([`Vertical`]). Where the rows
+//! before lead along the columns is taken off the first one's answer before anything is made of it, so that a line is found,
+//! checked and unsmeared as one that moves along its row alone; what was taken off is put back at the end. Rows are never
+//! solved one by one: what leads downwards is the mean of the second products of the last rows, by their information, and
+//! serves only for terms that are small.
+//!
+//! Terms of second order are each row's own, and so are those of third order along one axis. The others are small; a texture of no preferred direction answers to both shifts as if it were weakened by
+//! 1 − (b_x·x² + b_y·y²), b = curvature/6, along either axis (an isotropic spectrum's fourth moments: ⟨k_x⁴⟩ = 3⟨k_x²·k_y²⟩).
+
+use super::{
+    Place, Rejected, Tracker,
+    correlate::whole_sums,
+    overlap::{Overlap, nearest_step},
+    predict::Prediction,
+    row::{Row, Summed},
+    schedule::FastRows,
+};
+use crate::{
+    camera::Line,
+    camera::pixel::Pixel,
+    reference::{RowTable, VerticalTable, at_least_1},
+    timeline::{Begin, Binner, Displacement, RowShift, Sample, Vertical},
+};
+
+/// Weight of what was known of the motion along the columns a row ago.
+const KEEP: f32 = 0.75;
+/// A row's place is no surer from the rows before it than this, 1/px²: 0.03 px, as the picture moves on.
+const MOST_INFORMATION: f32 = 1e3;
+/// Beyond this the rows' expansions say nothing, px.
+const MOST_PX: f32 = 2.0;
+
+/// What measuring along both axes remembers.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Planar {
+    /// Where rows lead along the columns, px, and what is known of that, 1/px².
+    down_px: f32,
+    information: f32,
+    /// Where the present line seems to be along the columns, px.
+    near_px: f32,
+    /// How much of that its first product takes for a shift to the right, px.
+    pub(super) lean_px: f32,
+    /// A sixth of the curvatures along x and y, 1/px².
+    bend: [f32; 2],
+    /// Rows that take the fast path.
+    pub(super) fast: FastRows,
+    /// What the last line that was measured came to.
+    first: Place,
+    vertical: Vertical,
+}
+
+impl Planar {
+    /// Where the present line is along the columns, px.
+    pub(super) fn down_px(&self) -> f32 {
+        self.near_px
+    }
+
+    /// The rows have been built again: their `curvatures_per_px2` along x and y.
+    pub(super) fn end_round(&mut self, curvatures_per_px2: [f32; 2]) {
+        *self = Self {
+            bend: curvatures_per_px2.map(|c| (c / 6.0).clamp(0.0, 1.0)),
+            ..Self::default()
+        };
+    }
+
+    /// A line of this row whose second product, at the reference's brightness, is `second`, while it is about `right_px` from
+    /// the whole shift that it is read at: where it seems to be along the columns, and what is known of that.
+    #[inline(always)]
+    fn approach(&mut self, right_px: f32, second: f32, table: &VerticalTable) -> f32 {
+        let seen = table.shift_px(second, [right_px, self.down_px]);
+        let own = table.information_per_px2();
+        let before = self.information * KEEP;
+        let before = if before < MOST_INFORMATION {
+            before
+        } else {
+            MOST_INFORMATION
+        };
+        let information = before + own;
+        // Of a row that knows nothing nothing comes.
+        self.near_px = self.down_px + (seen - self.down_px) * (own / at_least_1(information));
+        self.lean_px = table.lean_px([right_px, self.near_px]);
+        information
+    }
+
+    /// The line fits.
+    #[inline(always)]
+    fn accept(&mut self, information: f32) {
+        self.information = information;
+        // What is no number is not near either.
+        let near = self.near_px.abs() <= MOST_PX;
+        self.down_px = if near { self.near_px } else { 0.0 };
+    }
+
+    /// What both products of a line say. `upright_px`: what the first one read as if the line had moved along its row alone,
+    /// from the whole shift nearest to it on; `second`: the second product at the reference's brightness.
+    #[inline(always)]
+    fn settle(&self, upright_px: f32, second: f32, table: &VerticalTable) -> (f32, Vertical) {
+        let near = [upright_px, self.near_px];
+        let [square_x, square_y] = near.map(|v| v * v);
+        let coupling = table.coupling();
+        let lean = coupling * self.near_px;
+        let [bend_x, bend_y] = self.bend;
+        let right = upright_px * (1.0 + bend_y * square_y) + 3.0 * bend_x * square_x * lean;
+        let down = table.shift_px(second, near) + self.near_px * bend_x * square_x;
+        let vertical = Vertical {
+            shift_px: down,
+            information_per_px2: table.information_per_px2(),
+            coupling,
+            ..Vertical::default()
+        };
+        (right + lean, vertical)
+    }
+}
+
+impl Tracker<'_> {
+    /// A line of a row begins, which is expected at `shift_px` along it.
+    pub(super) fn begin_planar<P: Pixel>(&mut self, row: usize, pixels: &[P], shift_px: f32) {
+        let whole = nearest_step(shift_px, i32::from(self.config.stride));
+        // At the brightness of the line before.
+        let second = self.second_product(row, pixels, whole);
+        if let (Some(second), Some(table)) = (second, self.store.vertical_table(row)) {
+            self.planar.approach(shift_px - whole as f32, second, table);
+            self.correlator.lean_px = self.planar.lean_px;
+        }
+    }
+
+    /// The second half of a line that was found at `shift_px` along its row; where it is, what it leads to along the columns
+    /// taken off.
+    pub(super) fn measure_down<P: Pixel>(
+        &mut self,
+        row: usize,
+        table: &RowTable,
+        pixels: &[P],
+        shift_px: f32,
+        aside_px: f32,
+    ) -> Result<f32, Rejected> {
+        let whole = nearest_step(shift_px, i32::from(self.config.stride));
+        let product = self.second_product(row, pixels, whole);
+        let (Some(second), Some(vertical_table)) = (product, self.store.vertical_table(row)) else {
+            return Err(Rejected::NoTexture);
+        };
+        let near = shift_px - whole as f32;
+        let (lean_px, mut planar) = (self.planar.lean_px, self.planar);
+        let information = planar.approach(near, second, vertical_table);
+        let upright = near + lean_px - planar.lean_px;
+        let (first, vertical) = planar.settle(upright, second, vertical_table);
+        if !(first + vertical.shift_px).is_finite() {
+            return Err(Rejected::NoTexture);
+        }
+        planar.accept(information);
+        planar.first = Place {
+            shift_px: whole as f32 - aside_px + first,
+            information_per_px2: table.information_per_px2(),
+        };
+        planar.vertical = vertical;
+        self.planar = planar;
+        Ok(whole as f32 + upright)
+    }
+
+    /// Σ h'·p of a line that is read `whole` pixels further right, at the reference's brightness.
+    fn second_product<P: Pixel>(&self, row: usize, pixels: &[P], whole: i32) -> Option<f32> {
+        let overlap = Overlap::new(pixels.len(), whole)?;
+        let (product, _) = P::part_sums(
+            self.config.kernel,
+            pixels.get(overlap.line)?,
+            self.store.vertical_coefficients(row)?,
+            overlap.reference.start,
+        );
+        Some(product * self.light.to_reference)
+    }
+
+    /// Place of a line of a row whose edges all lie along it: it tells of the motion along the columns alone.
+    #[cold]
+    pub(super) fn locate_down<R: Row>(
+        &mut self,
+        row: usize,
+        table: &RowTable,
+        pixels: &mut R,
+        aside_px: f32,
+    ) -> Result<Place, Rejected> {
+        let knows = |t: &VerticalTable| t.information_per_px2() > 0.0;
+        if !self.store.vertical_table(row).is_some_and(knows) {
+            return Err(Rejected::NoTexture);
+        }
+        let Some((_, sum)) = whole_sums(&self.store, row, pixels) else {
+            return Err(Rejected::NoTexture);
+        };
+        let before =
+            core::mem::replace(&mut self.light.to_reference, table.factor_to_reference(sum));
+        let shift_px = self.prediction.at(row) + aside_px;
+        self.begin_planar(row, pixels.pixels(), shift_px);
+        if row >= self.schedule.next_check || !self.light.may_have_been(before) {
+            let fits = self.fits(row, pixels.pixels(), shift_px);
+            self.note_fit(fits);
+            self.after_check(row, pixels.pixels(), fits.then_some(shift_px));
+            if !fits {
+                return Err(Rejected::Occluded);
+            }
+        }
+        self.measure_down(row, table, pixels.pixels(), shift_px, aside_px)?;
+        self.light.add_since(before);
+        let place = Place {
+            shift_px: 0.0,
+            information_per_px2: 0.0,
+        };
+        self.planar.first = place;
+        Ok(place)
+    }
+
+    /// What most lines take where both axes are measured, as [`Tracker::take_fast`]; `None` where it is refused, and nothing
+    /// has changed.
+    #[inline(always)]
+    pub(super) fn take_fast_planar<R: Summed>(
+        &mut self,
+        line: &Line<'_>,
+        pixels: &R,
+        times: bool,
+    ) -> Option<Place> {
+        let is_fast = self.planar.fast.has(line) && pixels.len() == usize::from(self.config.width);
+        if !is_fast {
+            return None;
+        }
+        let row = usize::from(line.row);
+        let (table, vertical_table) = (self.store.table(row)?, self.store.vertical_table(row)?);
+        if !table.has_texture() {
+            return None;
+        }
+        let (first, second, sum) = pixels.both_sums(
+            self.config.kernel,
+            self.store.coefficients(row)?,
+            self.store.vertical_coefficients(row)?,
+        );
+        let to_reference = table.factor_to_reference(sum);
+        let mut planar = self.planar;
+        let second = second * to_reference;
+        let information = planar.approach(self.prediction.predicted_px(), second, vertical_table);
+        let upright_px = table.shift_of_leaning_px(first * to_reference, planar.lean_px);
+        let surprise_px = upright_px - self.prediction.predicted_px();
+        let small =
+            upright_px.abs() <= self.correlator.near_px && Prediction::is_small(surprise_px);
+        if !small || !self.light.may_become(to_reference) {
+            return None;
+        }
+        let (shift_px, vertical) = planar.settle(upright_px, second, vertical_table);
+        let information_per_px2 = table.information_per_px2();
+        // Not true of what is no number.
+        if !(vertical.shift_px.abs() < f32::MAX) {
+            return None;
+        }
+        planar.accept(information);
+        planar.vertical = vertical;
+        planar.first = Place {
+            shift_px,
+            information_per_px2,
+        };
+        self.planar = planar;
+        if times {
+            self.light.add_settled(to_reference);
+        }
+        self.light.to_reference = to_reference;
+        self.prediction
+            .add_at_rest(surprise_px, information_per_px2);
+        self.counts.measured = self.counts.measured.wrapping_add(1);
+        Some(planar.first)
+    }
+
+    /// What the line that was measured last is to others.
+    #[inline]
+    pub(super) fn planar_displacement(&self, line: &Line<'_>, time_ns: i64) -> Displacement {
+        Displacement {
+            frame: line.frame,
+            row: line.row,
+            time_ns,
+            shift_px: self.planar.first.shift_px + self.store.anchor_px(),
+            information_per_px2: self.planar.first.information_per_px2,
+            vertical: Some(self.planar.vertical),
+        }
+    }
+
+    /// Passes the line that was measured last on.
+    #[inline(always)]
+    pub(super) fn pass_on_planar(&self, line: &Line<'_>, binner: &mut Binner) -> Option<Sample> {
+        let Place {
+            shift_px,
+            information_per_px2,
+        } = self.planar.first;
+        let row = RowShift {
+            frame: line.frame,
+            row: line.row,
+            shift_px,
+            information_per_px2,
+        };
+        let done = binner.push_row(row, || Begin {
+            middle_ns: self.middle_ns(line),
+            curvature: self.curvature(),
+            to_reference: self.light.to_reference,
+            anchor_px: self.store.anchor_px(),
+        });
+        binner.note_vertical(row, &self.planar.vertical);
+        done
+    }
+}
