@@ -4,12 +4,15 @@
 //! what it is however long the recording. Frames that are kept (while a reference is learned) are
 //! replaced by new buffers, so keeping does not stop the reader.
 
-use std::fs::File;
-use std::io::{self, Read};
+use std::io::Read;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
 use super::clock::{Clock, Times};
-use super::mapped::MappedReader;
-use super::y4m::{FrameSource, Next, Reader};
+use super::recording::{About, Recording};
+use super::source::FrameSource;
+use super::y4m::Next;
 use super::{Camera, CameraArgs, Frame, Turn};
 use crate::ring::{Inlet, Next as Arrival, Outlet, ring};
 use rowtone_failure::Failure;
@@ -25,11 +28,14 @@ const BLOCKS: usize = 6;
 /// Most frames of a block.
 const BLOCK_FRAMES: usize = 64;
 
+/// How often it is asked whether to stop, where no frame comes.
+const ASKED_EVERY: Duration = Duration::from_millis(100);
+
 /// How the reading ended.
 #[derive(Debug)]
 enum Ending {
-    /// At the end of the file.
-    End,
+    /// At the end of the file; with something to tell the user.
+    End(Option<String>),
     /// Inside a frame; the frames before it are good.
     Truncated(String),
     /// It could not go on.
@@ -46,8 +52,13 @@ pub struct Feed {
     pub name: String,
     /// How many frames there are, where the file's length tells.
     pub frames: Option<u64>,
+    /// What is known of the recording beside that.
+    pub about: About,
+    /// What to tell the user before anything is measured.
+    pub notes: Vec<String>,
     warning: Option<String>,
     delivered: u64,
+    stop: Option<Arc<AtomicBool>>,
 }
 
 impl Feed {
@@ -57,30 +68,7 @@ impl Feed {
     /// [`Failure`] for options or an input that cannot be used.
     pub fn open(args: &CameraArgs) -> Result<Self, Failure> {
         args.check()?;
-        if args.input == "-" {
-            return Self::read(args, io::stdin());
-        }
-        let cannot = |what: &str, error: &io::Error| {
-            Failure::input(format!("{}: cannot be {what}: {error}", args.input))
-        };
-        let file = File::open(&args.input).map_err(|e| cannot("opened", &e))?;
-        let meta = file.metadata().map_err(|e| cannot("read", &e))?;
-        if meta.is_dir() {
-            return Err(Failure::input(format!(
-                "{}: is a folder: give a Y4M file",
-                args.input
-            )));
-        }
-        if !meta.is_file() {
-            return Self::read(args, file);
-        }
-        let reader = Reader::open(file, args.name())?;
-        let behind_header = meta.len().saturating_sub(reader.header_bytes() as u64);
-        let frames = Some(behind_header / reader.stride() as u64);
-        match MappedReader::new(&reader) {
-            Ok(mapped) => Self::start(args, mapped, frames, None),
-            Err(_) => Self::start(args, reader, frames, None),
-        }
+        Self::start(args, Recording::open(&args.input, args.name())?, None)
     }
 
     /// Reads `from` instead of the input that `args` name.
@@ -89,8 +77,7 @@ impl Feed {
     /// As [`Feed::open`].
     pub fn read(args: &CameraArgs, from: impl Read + Send + 'static) -> Result<Self, Failure> {
         args.check()?;
-        let reader = Reader::open(from, args.name())?;
-        Self::start(args, reader, None, None)
+        Self::start(args, Recording::read(from, args.name())?, None)
     }
 
     /// Reads `from`, of which the frames' times are known otherwise than by a file that `args` name.
@@ -103,25 +90,26 @@ impl Feed {
         times: Times,
     ) -> Result<Self, Failure> {
         args.check()?;
-        let reader = Reader::open(from, args.name())?;
-        let frames = Some(times.len() as u64);
-        Self::start(args, reader, frames, Some(Clock::Times(times)))
+        let mut recording = Recording::read(from, args.name())?;
+        recording.about.frames = Some(times.len() as u64);
+        Self::start(args, recording, Some(Clock::Times(times)))
     }
 
-    /// Starts the reading thread. `frames`: how many there are, where that is known; `clock`: their times, where `args`
-    /// do not say.
+    /// Starts the reading thread. `clock`: the frames' times, where `args` do not say.
     fn start(
         args: &CameraArgs,
-        source: impl FrameSource + Send + 'static,
-        frames: Option<u64>,
+        recording: Recording,
         clock: Option<Clock>,
     ) -> Result<Self, Failure> {
+        let Recording { source, about } = recording;
         let name = args.name().to_owned();
         let clock = match clock {
             Some(clock) => clock,
-            None => args.clock(source.header())?,
+            None => args.clock(source.header(), &about)?,
         };
-        let camera = args.camera(source.header(), clock.fps())?;
+        let camera = args.camera(source.header(), &clock, &about)?;
+        let notes = args.notes(source.header(), &about);
+        let frames = about.frames;
         let ahead = match frames {
             Some(_) => AHEAD_BYTES / source.header().luma_bytes(),
             None => LEAST_AHEAD,
@@ -137,6 +125,7 @@ impl Feed {
             name: name.clone(),
             pts: pts.unwrap_or_default(),
             frames,
+            ends_in_a_frame: about.ends_in_a_frame,
         };
         std::thread::spawn(move || thread.run(outlet));
         Ok(Self {
@@ -144,9 +133,17 @@ impl Feed {
             camera,
             name,
             frames,
+            notes,
+            about,
             warning: None,
             delivered: 0,
+            stop: None,
         })
+    }
+
+    /// Ends the recording at the next frame as soon as this says so, as if it were its last.
+    pub fn stop_when(&mut self, stop: Arc<AtomicBool>) {
+        self.stop = Some(stop);
     }
 
     /// The next frame; `None` after the last.
@@ -155,7 +152,21 @@ impl Feed {
     /// [`Failure::Input`] when the input turns out to be unusable at this point: the frames before it
     /// were good. A recording without any frame is unusable.
     pub fn next_frame(&mut self) -> Result<Option<Frame>, Failure> {
-        match self.inlet.receive() {
+        let stopped = || {
+            self.stop
+                .as_ref()
+                .is_some_and(|stop| stop.load(Ordering::Relaxed))
+        };
+        let arrival = loop {
+            if stopped() {
+                return Ok(None);
+            }
+            match self.inlet.receive_within(ASKED_EVERY) {
+                Some(arrival) => break arrival,
+                None => {}
+            }
+        };
+        match arrival {
             Arrival::Item(frame) => {
                 self.delivered += 1;
                 if self.delivered == 2
@@ -171,8 +182,17 @@ impl Feed {
                 Ok(None)
             }
             Arrival::End(Ending::Truncated(text)) => Err(Failure::input(text)),
-            Arrival::End(Ending::End) | Arrival::Gone if self.delivered > 0 => Ok(None),
-            Arrival::End(Ending::End) | Arrival::Gone => Err(Failure::input(format!(
+            Arrival::End(Ending::End(warning)) if self.delivered > 0 => {
+                self.warning = warning;
+                Ok(None)
+            }
+            Arrival::Gone if self.delivered > 0 => Ok(None),
+            Arrival::End(Ending::End(warning)) => {
+                Err(Failure::input(warning.unwrap_or_else(|| {
+                    format!("{}: there is no frame in it", self.name)
+                })))
+            }
+            Arrival::Gone => Err(Failure::input(format!(
                 "{}: there is no frame in it",
                 self.name
             ))),
@@ -191,16 +211,17 @@ impl Feed {
 }
 
 /// The reading thread.
-struct Reading<S> {
-    source: S,
+struct Reading {
+    source: Box<dyn FrameSource + Send>,
     clock: Clock,
     turn: Turn,
     name: String,
     pts: String,
     frames: Option<u64>,
+    ends_in_a_frame: bool,
 }
 
-impl<S: FrameSource> Reading<S> {
+impl Reading {
     /// Reads until the end, or until nobody listens any more.
     fn run(mut self, mut to: Outlet<Frame, Ending>) {
         for index in 0.. {
@@ -210,7 +231,10 @@ impl<S: FrameSource> Reading<S> {
             let ending = match self.read(index, &mut frame) {
                 Ok(Next::Frame { .. }) if to.put(frame) => continue,
                 Ok(Next::Frame { .. }) => return,
-                Ok(Next::End) => Ending::End,
+                Ok(Next::End) => self.times_left(index).map_or_else(
+                    || Ending::End(self.source.warning()),
+                    |have| Ending::Failed(self.too_many_times(have, index)),
+                ),
                 Ok(Next::Truncated { have, need }) => {
                     Ending::Truncated(self.truncated(index, have, need))
                 }
@@ -224,7 +248,9 @@ impl<S: FrameSource> Reading<S> {
         let next = self.source.next_frame(&mut frame.raw)?;
         if let Next::Frame { luma } = next {
             self.check_times(index)?;
-            if let Some((number, start_ns)) = self.clock.frame(index) {
+            let stamp = self.source.stamp();
+            frame.coding = stamp.coding;
+            if let Some((number, start_ns)) = self.clock.frame(index, stamp.time_ns) {
                 (frame.number, frame.start_ns) = (number, start_ns);
             }
             frame.prepare(self.source.header(), luma, self.turn);
@@ -242,6 +268,12 @@ impl<S: FrameSource> Reading<S> {
             Some(frames) if index == 0 => frames,
             _ => index + 1,
         };
+        if let Some(frames) = self.frames
+            && index == 0
+            && have > frames + u64::from(self.ends_in_a_frame)
+        {
+            return Err(self.too_many_times(have, frames));
+        }
         if need <= have {
             return Ok(());
         }
@@ -254,6 +286,24 @@ impl<S: FrameSource> Reading<S> {
             "{}: only {have} times for {at_least}{need} frames of {}: every frame needs its own",
             self.pts, self.name
         )))
+    }
+
+    /// How many times there are, where the recording has ended after `frames` frames and has fewer.
+    fn times_left(&self, frames: u64) -> Option<u64> {
+        match &self.clock {
+            Clock::Times(times) if self.frames.is_none() && frames > 0 => {
+                Some(times.len() as u64).filter(|&have| have > frames)
+            }
+            _ => None,
+        }
+    }
+
+    fn too_many_times(&self, have: u64, frames: u64) -> Failure {
+        Failure::input(format!(
+            "{}: {have} times for the {frames} frames of {}: which frames are missing is not known, so \
+             no time is sure",
+            self.pts, self.name
+        ))
     }
 
     fn truncated(&self, index: u64, have: usize, need: usize) -> String {

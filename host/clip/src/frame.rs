@@ -5,7 +5,7 @@ use std::ops::Range;
 use rowtone::camera::{Line, Pixels, Timing};
 
 use super::bytes::Bytes;
-use super::{Header, Rect, Turn};
+use super::{Coding, Header, Rect, Turn};
 
 /// One frame, in buffers that are used again for a later one.
 #[derive(Debug, Default)]
@@ -14,6 +14,8 @@ pub struct Frame {
     pub number: u32,
     /// Start of exposure of its first row, ns.
     pub start_ns: i64,
+    /// How it was coded in its file; `None` in files of plain pixels.
+    pub coding: Option<Coding>,
     /// As read: the marker, then the planes.
     pub(super) raw: Bytes,
     /// First byte of the luma plane in `raw`.

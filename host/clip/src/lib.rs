@@ -1,14 +1,19 @@
-//! Videos in: Y4M files and standard input as frames of lines, with the camera options that every
+//! Videos in: any video file and standard input as frames of lines, with the camera options that every
 //! command shares.
 //!
 //! [`CameraArgs`] are the options; [`Feed::open`] checks them against the file and starts reading;
-//! [`Feed::next_frame`] delivers [`Frame`]s, and a frame hands out the core's lines.
+//! [`Feed::next_frame`] delivers [`Frame`]s, and a frame hands out the core's lines. Y4M is read by this
+//! crate itself ([`y4m`]); every other video goes through the program ffmpeg ([`ffmpeg`]). What the clip
+//! knows that its reports must say, such as times that were rounded, is in [`Camera::warnings`].
 
 mod bytes;
 mod calibration;
 mod clock;
+mod decoded;
 mod feed;
+pub mod ffmpeg;
 mod frame;
+pub mod grid;
 mod header;
 mod mapped;
 mod options;
@@ -17,13 +22,17 @@ mod pixel_format;
 #[cfg(target_os = "linux")]
 mod populate;
 pub mod pts;
+mod recording;
 pub mod ring;
+mod source;
 pub mod y4m;
 
-pub use clock::{Clock, Times};
+pub use clock::{Clock, Stamped, Times};
 pub use feed::Feed;
 pub use frame::Frame;
 pub use header::Header;
 pub use options::{Camera, CameraArgs};
 pub use part::{Rect, Roi, Turn};
 pub use pixel_format::PixelFormat;
+pub use recording::About;
+pub use source::Coding;

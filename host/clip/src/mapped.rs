@@ -15,7 +15,8 @@ use super::Header;
 use super::bytes::Bytes;
 #[cfg(target_os = "linux")]
 use super::populate::Populate;
-use super::y4m::{FrameSource, Layout, Next, Reader};
+use super::source::FrameSource;
+use super::y4m::{Layout, Next, Reader};
 use rowtone_failure::Failure;
 
 /// Bytes that are mapped at once; more where a frame is larger.

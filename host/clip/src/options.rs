@@ -3,14 +3,20 @@
 use std::path::PathBuf;
 
 use rowtone::camera::Timing;
+use rowtone::report::{Warning, Warnings};
 
-use super::clock::{Clock, Times};
-use super::{Header, Rect, Roi, Turn, calibration, pts};
+use super::clock::{Clock, Stamped, Times};
+use super::ffmpeg::Probe;
+use super::{About, Header, Rect, Roi, Turn, calibration, decoded, ffmpeg, pts};
 use rowtone_failure::Failure;
 
 /// Longest line time and exposure that [`Timing`] holds, µs.
 const LONGEST_LINE_TIME_US: f64 = 4294.0;
 const LONGEST_EXPOSURE_US: f64 = 4_294_000.0;
+/// Shorter is no rolling shutter's: the fastest sensors take half a µs.
+const SHORTEST_LINE_TIME_US: f64 = 0.3;
+/// A frame rate that differs from the file's by less than this share is the same.
+const SAME_RATE: f64 = 1e-3;
 /// A read-out may be this much longer than the frame period before it is refused: a calibration is not
 /// exact.
 const READOUT_SLACK: f64 = 1.02;
@@ -19,13 +25,13 @@ const READOUT_SLACK: f64 = 1.02;
 #[derive(Clone, Debug, clap::Args)]
 #[command(next_help_heading = "Camera")]
 pub struct CameraArgs {
-    /// A Y4M file, or `-` for standard input
+    /// A video file (mp4, mov, mkv, avi, ...: read through ffmpeg; or Y4M), or `-` for Y4M on standard input
     #[arg(value_name = "INPUT", help_heading = None)]
     pub input: String,
-    /// Frame rate, Hz [default: the file's]
+    /// Frame rate, Hz, whatever the file says: slow motion states the rate it is played at [default: the file's]
     #[arg(long, value_name = "F", value_parser = positive, allow_negative_numbers = true)]
     pub fps: Option<f64>,
-    /// Start of exposure of every frame: timecode format v2, ms [default: frame number / fps]
+    /// Start of exposure of every frame: timecode format v2, ms [default: the file's times, else frame number / fps]
     #[arg(long, value_name = "FILE")]
     pub pts: Option<PathBuf>,
     /// Time from one row to the next, µs
@@ -34,7 +40,7 @@ pub struct CameraArgs {
     /// Takes the line time from a file that `rowtone calibrate` wrote
     #[arg(long, value_name = "FILE", conflicts_with_all = ["line_time_us", "global_shutter"])]
     pub calibration: Option<PathBuf>,
-    /// Exposure of a row, µs [default: the calibration's, else 0]
+    /// Exposure of a row, µs [default: the calibration's; else not known, and amplitudes are as filmed]
     #[arg(long, value_name = "T", value_parser = not_negative, allow_negative_numbers = true)]
     pub exposure_us: Option<f64>,
     /// Part of the picture to use, px; also `full` or `auto` [default: auto]
@@ -48,11 +54,13 @@ pub struct CameraArgs {
     /// Part that does not vibrate, px: its motion is the camera's own and is subtracted
     #[arg(long, value_name = "X,Y,W,H")]
     pub background: Option<Rect>,
-    /// Turns the picture clockwise first, for vertical motion: what moves up then moves right, and
-    /// columns are rows. Parts are given in the picture as it was
+    /// Turns the given picture clockwise by so many degrees before measuring, so that its rows are the
+    /// sensor's: for files whose pixels were turned. The rotation that a phone writes into a file needs
+    /// none: it is for players, and the stored rows are the sensor's. --roi and --background are given in
+    /// the picture before it is turned
     #[arg(
         long,
-        value_name = "90",
+        value_name = "0|90|180|270",
         default_value = "0",
         hide_default_value = true,
         allow_hyphen_values = true
@@ -99,6 +107,8 @@ pub struct Camera {
     pub background: Option<Rect>,
     /// How the picture is turned.
     pub turn: Turn,
+    /// What every report on the recording warns of.
+    pub warnings: Warnings,
     /// Scale, µm a pixel.
     pub um_per_px: Option<f64>,
     /// What is wrong with the options if the header is right about the picture's size, which shows only
@@ -175,6 +185,11 @@ impl CameraArgs {
             }
             Ok(())
         };
+        if let Some(us) = self.line_time_us.filter(|&us| us < SHORTEST_LINE_TIME_US) {
+            return Err(Failure::usage(format!(
+                "--line-time-us {us} is shorter than any sensor's: it is in µs, so 18.9 for 18.9e-6 s"
+            )));
+        }
         limit(
             "--line-time-us",
             self.line_time_us.unwrap_or(0.0),
@@ -191,7 +206,7 @@ impl CameraArgs {
     ///
     /// # Errors
     /// [`Failure::Input`] for a file of times that cannot be used, or when nothing gives a frame rate.
-    pub fn clock(&self, header: &Header) -> Result<Clock, Failure> {
+    pub fn clock(&self, header: &Header, about: &About) -> Result<Clock, Failure> {
         let fps = self.fps.or(header.fps);
         let no_rate = || {
             Failure::input(format!(
@@ -199,20 +214,58 @@ impl CameraArgs {
                 self.name()
             ))
         };
-        match &self.pts {
-            None => fps.map(Clock::Rate).ok_or_else(no_rate),
-            Some(path) => Times::new(pts::read(path)?, fps)
-                .map(Clock::Times)
-                .ok_or_else(no_rate),
+        if let Some(path) = &self.pts {
+            let times = pts::read(path)?;
+            if let Some(unit) = pts::wrong_unit(&times, fps) {
+                return Err(Failure::input(wrong_unit(path, unit, &times, fps)));
+            }
+            return Times::new(times, fps).map(Clock::Times).ok_or_else(no_rate);
         }
+        let Some(probe) = &about.probe else {
+            return fps.map(Clock::Rate).ok_or_else(no_rate);
+        };
+        if !probe.has_times() {
+            let nothing =
+                || decoded::failure(self.name(), &ffmpeg::Error::NoTimes(probe.format.clone()));
+            return self.fps.map(Clock::Rate).ok_or_else(nothing);
+        }
+        Stamped::new(probe.times_ns.clone(), probe.fps, self.fps)
+            .map(Clock::Stamped)
+            .ok_or_else(no_rate)
+    }
+
+    /// What to tell the user of an input before it is measured, without its name.
+    pub fn notes(&self, header: &Header, about: &About) -> Vec<String> {
+        let mut notes = Vec::new();
+        let probe = about.probe.as_ref();
+        if let (Some(given), Some(said)) = (self.fps, header.fps)
+            && probe.is_none_or(Probe::has_times)
+            && (given / said - 1.0).abs() > SAME_RATE
+        {
+            notes.push(format!(
+                "--fps {given} is used; the file says {said:.3} fps"
+            ));
+        }
+        let has_parts = matches!(self.roi, Roi::Part(_)) || self.background.is_some();
+        if let Some(probe) = probe
+            && probe.rotation_deg != 0
+            && has_parts
+        {
+            notes.push(format!(
+                "players turn this file by {} degrees; parts are given in the picture as it is stored, {}x{}",
+                probe.rotation_deg, probe.width, probe.height
+            ));
+        }
+        notes
     }
 
     /// The camera, once the header is known.
     ///
     /// # Errors
     /// [`Failure::Usage`] for a part outside the picture; [`Failure::Input`] for a calibration file that cannot be used.
-    pub fn camera(&self, header: &Header, fps: f64) -> Result<Camera, Failure> {
+    pub fn camera(&self, header: &Header, clock: &Clock, about: &About) -> Result<Camera, Failure> {
         self.check()?;
+        let fps = clock.fps();
         let (width, height) = (header.width, header.height);
         let calibrated = self
             .calibration
@@ -224,10 +277,19 @@ impl CameraArgs {
             (None, given) => given.unwrap_or(0.0),
         };
         let measured = calibrated.and_then(|calibrated| calibrated.exposure_s);
-        let exposure_us = self
-            .exposure_us
-            .or(measured.map(|s| s * 1e6))
-            .unwrap_or(0.0);
+        let known_us = self.exposure_us.or(measured.map(|s| s * 1e6));
+        let exposure_us = known_us.unwrap_or(0.0);
+        if exposure_us * 1e-6 * fps > READOUT_SLACK {
+            return Err(Failure::usage(format!(
+                "an exposure of {exposure_us} µs is longer than a frame at {fps:.3} fps ({:.0} µs): check \
+                 --exposure-us and --fps",
+                1e6 / fps
+            )));
+        }
+        let mut warnings = Warnings::NONE;
+        warnings.insert_if(known_us.is_none(), Warning::ExposureUnknown);
+        warnings.insert_if(clock.coarse_ns().is_some(), Warning::CoarseTimes);
+        warnings.insert_if(about.is_compressed_for_good(), Warning::Compressed);
         // A sensor that reads its last row first: turned upside down, rows are in order of time again.
         let turn = match calibrated {
             Some(calibrated) if calibrated.upward => self.rotate.upside_down(),
@@ -277,8 +339,22 @@ impl CameraArgs {
             part,
             background,
             turn,
+            warnings,
             um_per_px: self.um_per_px,
             doubt,
         })
     }
+}
+
+/// What is said of times in another unit.
+fn wrong_unit(path: &std::path::Path, unit: &str, times: &[i64], fps: Option<f64>) -> String {
+    let period = pts::period_ns(times).unwrap_or(0) as f64 * 1e-6;
+    let expected = fps.map_or(String::new(), |fps| {
+        format!(", where a frame at {fps:.3} fps takes {:.3} ms", 1e3 / fps)
+    });
+    format!(
+        "{}: its times look like {unit} ({period} from frame to frame{expected}): timecode format v2 holds \
+         milliseconds",
+        path.display()
+    )
 }

@@ -33,6 +33,14 @@ impl PixelFormat {
         chroma: Chroma::C420,
     };
 
+    /// Luma alone, of so many bits, 8 to 16.
+    pub const fn luma(bits: u8) -> Self {
+        Self {
+            bits,
+            chroma: Chroma::None,
+        }
+    }
+
     /// Reads the colour tag without its `C`: `mono`, `mono10`, `420jpeg`, `422p10`, …
     /// `None` for one that is not known.
     ///

@@ -12,9 +12,52 @@ use rowtone_failure::Failure;
 /// and for a file without any.
 pub fn read(path: &Path) -> Result<Vec<i64>, Failure> {
     let name = path.display();
-    let text = std::fs::read_to_string(path)
-        .map_err(|e| Failure::input(format!("{name}: cannot be read: {e}")))?;
+    let bytes =
+        std::fs::read(path).map_err(|e| Failure::input(format!("{name}: cannot be read: {e}")))?;
+    let text = String::from_utf8(bytes).map_err(|_| {
+        Failure::input(format!(
+            "{name}: is no text: --pts wants a file of times, one in milliseconds a line"
+        ))
+    })?;
     parse(&text).map_err(|what| Failure::input(format!("{name}: {what}")))
+}
+
+/// The unit of times that cannot be in milliseconds. They were read as such, ns; the recording is said to
+/// have `fps`, Hz. `None` where they may be right: slow motion states another rate than it was filmed at.
+///
+/// ```
+/// let us = rowtone_clip::pts::parse("0\n16667\n33333\n50000\n").unwrap();
+/// assert_eq!(rowtone_clip::pts::wrong_unit(&us, Some(60.0)), Some("microseconds"));
+/// assert_eq!(rowtone_clip::pts::wrong_unit(&us, Some(0.06)), None);
+/// ```
+pub fn wrong_unit(times_ns: &[i64], fps: Option<f64>) -> Option<&'static str> {
+    let period_s = period_ns(times_ns)? as f64 * 1e-9;
+    let Some(fps) = fps else {
+        // Slower than this is no camera that watches a machine.
+        return match period_s {
+            s if s < 0.5 => None,
+            s if s < 2000.0 => Some("microseconds"),
+            _ => Some("nanoseconds"),
+        };
+    };
+    let longer = period_s * fps;
+    let about = |factor: f64| (0.5..2.0).contains(&(longer / factor));
+    if about(1e3) {
+        return Some("microseconds");
+    }
+    if about(1e6) {
+        return Some("nanoseconds");
+    }
+    // High-speed cameras' files state a thousandth of their rate too, but not of such rates.
+    if about(1e-3) && period_s < 5e-5 {
+        return Some("seconds");
+    }
+    let impossible = period_s > 0.5 && longer > 8.0;
+    impossible.then_some(if longer < 3e4 {
+        "microseconds"
+    } else {
+        "nanoseconds"
+    })
 }
 
 /// Reads the text of such a file.
@@ -90,6 +133,46 @@ mod tests {
             let error = parse(text).unwrap_err();
             assert!(error.contains(wrong), "{text:?}: {error}");
         }
+    }
+
+    #[test]
+    fn times_in_other_units_are_recognised() {
+        let times = |scale: f64, fps: f64| -> Vec<i64> {
+            (0..100)
+                .map(|i| (f64::from(i) * 1e3 / fps * scale * 1e6) as i64)
+                .collect()
+        };
+        for fps in [25.0, 60.0, 240.0, 1000.0] {
+            assert_eq!(
+                wrong_unit(&times(1e3, fps), Some(fps)),
+                Some("microseconds"),
+                "{fps}"
+            );
+            assert_eq!(
+                wrong_unit(&times(1e6, fps), Some(fps)),
+                Some("nanoseconds"),
+                "{fps}"
+            );
+            assert_eq!(
+                wrong_unit(&times(1e-3, fps), Some(fps)),
+                Some("seconds"),
+                "{fps}"
+            );
+            // Played at another rate than filmed.
+            for said in [25.0, 30.0, 60.0, 240.0] {
+                assert_eq!(
+                    wrong_unit(&times(1.0, fps), Some(said)),
+                    None,
+                    "{fps} {said}"
+                );
+            }
+            assert_eq!(wrong_unit(&times(1.0, fps), None), None);
+        }
+        assert_eq!(wrong_unit(&times(1e3, 60.0), None), Some("microseconds"));
+        assert_eq!(
+            wrong_unit(&times(1e3, 250.0), Some(25.0)),
+            Some("microseconds")
+        );
     }
 
     #[test]

@@ -6,7 +6,8 @@
 //! all: a sender that is ahead is woken rarely, and has much to do then.
 
 use std::collections::VecDeque;
-use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
+use std::time::Duration;
 
 /// What goes over the channel.
 enum Message<T, E> {
@@ -113,6 +114,21 @@ impl<T: Default, E> Inlet<T, E> {
                 Ok(Message::Block(block)) => self.take(block),
                 Ok(Message::End(word)) => return Next::End(word),
                 Err(_) => return Next::Gone,
+            }
+        }
+    }
+
+    /// What comes next, if it comes within this time.
+    pub fn receive_within(&mut self, patience: Duration) -> Option<Next<T, E>> {
+        loop {
+            if let Some(thing) = self.current.pop_front() {
+                return Some(Next::Item(thing));
+            }
+            match self.from.recv_timeout(patience) {
+                Ok(Message::Block(block)) => self.take(block),
+                Ok(Message::End(word)) => return Some(Next::End(word)),
+                Err(RecvTimeoutError::Disconnected) => return Some(Next::Gone),
+                Err(RecvTimeoutError::Timeout) => return None,
             }
         }
     }

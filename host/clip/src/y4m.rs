@@ -10,6 +10,7 @@ use std::io::{self, Read};
 use super::Header;
 use super::bytes::Bytes;
 use super::header::MAGIC;
+use super::source::FrameSource;
 use rowtone_failure::Failure;
 
 /// The marker in front of a frame, as nearly all writers write it (parameters may follow).
@@ -34,18 +35,6 @@ pub enum Next {
         /// Bytes it should have.
         need: usize,
     },
-}
-
-/// Where frames come from, whatever the way.
-pub(super) trait FrameSource {
-    /// What the header says.
-    fn header(&self) -> &Header;
-
-    /// Puts the next frame, marker and all, into `bytes`.
-    ///
-    /// # Errors
-    /// As [`Reader::read_frame`].
-    fn next_frame(&mut self, bytes: &mut Bytes) -> Result<Next, Failure>;
 }
 
 /// How frames follow each other.

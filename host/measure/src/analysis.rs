@@ -244,6 +244,7 @@ impl<'a> Analysis<'a> {
         let rows = (self.unmeasured.len() * self.shifts.part.height).max(1);
         let share = |unmeasured: u32| f64::from(unmeasured) / rows as f64;
         let warnings = &mut report.warnings;
+        *warnings = warnings.union(self.shifts.camera.warnings);
         let occluded = share(unmeasured.disturbed) > DISTURBED_SHARE;
         warnings.insert_if(occluded, Warning::Occluded);
         warnings.insert_if(unmeasured.learning > 0, Warning::Relearned);

@@ -50,14 +50,15 @@ fn measure_all(
     let whole = Region::whole(&part);
     let mut lines = Lines::new(feed, part, &whole, &mut memory, still_memory.as_mut())?;
     let region = lines.learn_roughly_and_choose(&feed.camera, &kept, &part);
-    let mut note = None;
+    let mut notes = std::mem::take(&mut feed.notes);
     if region != whole {
-        note = Some(told(&region, &feed.camera));
+        notes.push(told(&region, &feed.camera));
         lines = Lines::new(feed, part, &region, &mut memory, still_memory.as_mut())?;
         lines.learn_roughly(&kept);
     }
     lines.binner = groups.map(Binner::new);
     lines.learn(&kept, 1);
+    let note = (!notes.is_empty()).then(|| notes.join("\n"));
     lines.run(feed, kept, more, note, to)
 }
 

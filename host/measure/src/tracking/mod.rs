@@ -42,7 +42,7 @@ pub struct FrameShifts {
     pub samples: Vec<Sample>,
     /// Rows that were not measured.
     pub unmeasured: Unmeasured,
-    /// Something to tell the user at once.
+    /// Something to tell the user at once, a line each.
     note: Option<String>,
 }
 
@@ -110,7 +110,9 @@ impl Shifts {
                 if let Some(note) = frame.note.take()
                     && !self.quiet
                 {
-                    eprintln!("rowtone: {}: {note}", self.name);
+                    for note in note.lines() {
+                        eprintln!("rowtone: {}: {note}", self.name);
+                    }
                 }
                 Ok(Some(frame))
             }
