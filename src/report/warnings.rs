@@ -129,6 +129,11 @@ impl Warnings {
         Self(warning.bit())
     }
 
+    /// The set without those of another.
+    pub const fn without(self, others: Self) -> Self {
+        Self(self.0 & !others.0)
+    }
+
     /// The set with these bits, those without a meaning too (a newer sender may know more).
     pub const fn from_bits(bits: u32) -> Self {
         Self(bits)

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use clap::ValueEnum;
-use rowtone::report::{MAX_PEAKS, Report};
+use rowtone::report::{MAX_PEAKS, Report, Warnings};
 use rowtone::wire::{Message, text as wire_text};
 
 use crate::output::Out;
@@ -22,8 +22,9 @@ use rowtone_serial::sender::Sender;
 /// Options of `rowtone analyze`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
-    rowtone analyze clip.y4m --line-time-us 18.9 --exposure-us 500 --format json\n  \
-    ffmpeg -i clip.mp4 -f yuv4mpegpipe - | rowtone analyze - --line-time-us 18.9")]
+    rowtone analyze clip.mp4 --line-time-us 18.9 --exposure-us 500\n  \
+    rowtone analyze clip.mov --fps 240 --line-time-us 7.6 --format json\n\n\
+    Videos other than Y4M are read through ffmpeg (sudo apt install ffmpeg).")]
 pub struct Args {
     #[command(flatten)]
     camera: CameraArgs,
@@ -128,6 +129,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let mut outlets = Outlets {
         format: args.format,
         zone_limits: args.zone_limits,
+        warnings: shifts.camera.warnings,
         progress: Progress::new(shifts.frames),
         out: Out::default(),
         serial,
@@ -186,6 +188,8 @@ fn session() -> u32 {
 struct Outlets {
     format: Format,
     zone_limits: Option<ZoneLimits>,
+    /// What the recording itself warns of.
+    warnings: Warnings,
     progress: Progress,
     out: Out,
     serial: Option<Sender>,
@@ -229,9 +233,14 @@ impl Outlets {
         {
             self.progress.note(&complaint);
         }
+        // They are the same in every report: a person hears them once.
+        let mut brief = report.clone();
+        if self.reports > 1 {
+            brief.warnings = brief.warnings.without(self.warnings);
+        }
         let out = &mut self.out;
         self.progress.aside(|| match self.format {
-            Format::Text => out.line(&text::zoned(report, self.zone_limits.as_ref())),
+            Format::Text => out.line(&text::zoned(&brief, self.zone_limits.as_ref())),
             Format::Json => out.line(&json::zoned(report, self.zone_limits.as_ref())),
             Format::Wire => sentence.map_or(Ok(()), |s| out.line(s.trim_end_matches('\n'))),
         })

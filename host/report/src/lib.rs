@@ -57,11 +57,16 @@ pub const fn sentence(warning: Warning) -> &'static str {
         Warning::TimingContradiction => {
             "the motion contradicts frame rate times line time: one of the two is wrong"
         }
-        Warning::Compressed => "the pictures were compressed: amplitudes are lower bounds",
+        Warning::Compressed => {
+            "the video codec took small motions away: amplitudes are lower bounds (record with more key frames, \
+             as MJPEG, ProRes or raw)"
+        }
         Warning::RepeatedFrames => "frames came more than once",
-        Warning::ExposureUnknown => "the exposure is unknown: amplitudes are as filmed",
+        Warning::ExposureUnknown => {
+            "the exposure is unknown: amplitudes are as filmed, those of fast tones too small (--exposure-us)"
+        }
         Warning::CoarseTimes => {
-            "the frames' times are coarse: frequencies are less sure than they say"
+            "the frames' times are rounded and follow no even rate: fast tones are too small and may show twice"
         }
     }
 }

@@ -18,11 +18,11 @@ const MAINS_RELATIVE_SD: f64 = 6e-4;
 /// Options of `rowtone calibrate`.
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "How precise on simulated cameras (one second of 480 rows): LED 1e-6; mains 6e-4,\nthe mains' own; unknown light 2e-5 by the camera's clock; a tone of 0.4 px 1e-4, of 0.05 px 1e-3.\ndocs/results.md says what makes each ambiguous.\n\nExamples:\n  rowtone calibrate led.y4m --led-hz 1000 -o calibration.toml\n  rowtone calibrate picture.png --led-hz 1000 --fps 29.97 --plot stripes.svg\n  rowtone calibrate one.jpg two.jpg three.jpg --led-hz 1000\n  rowtone calibrate lamp.y4m --mains 50"
+    after_help = "How precise on simulated cameras (one second of 480 rows): LED 1e-6; mains 6e-4,\nthe mains' own; unknown light 2e-5 by the camera's clock; a tone of 0.4 px 1e-4, of 0.05 px 1e-3.\ndocs/results.md says what makes each ambiguous.\n\nExamples:\n  rowtone calibrate led.mp4 --led-hz 1000 -o calibration.toml\n  rowtone calibrate picture.png --led-hz 1000 --fps 29.97 --plot stripes.svg\n  rowtone calibrate one.jpg two.jpg three.jpg --led-hz 1000\n  rowtone calibrate lamp.mp4 --mains 50"
 )]
 #[command(group(clap::ArgGroup::new("light").required(true).args(["led_hz", "mains", "unknown_light", "from_vibration"])))]
 pub struct Args {
-    /// A Y4M video (`-` for standard input), or PNG or JPEG pictures of the same scene
+    /// A video (mp4, mov, ... through ffmpeg; or Y4M; `-` for Y4M on standard input), or PNG or JPEG pictures of one scene
     #[arg(required = true)]
     pub input: Vec<String>,
     /// An LED flashes at this frequency, Hz

@@ -1,12 +1,10 @@
 //! Pictures and videos, one frame after another.
 
-use std::fs::File;
-use std::io::{self, Read};
 use std::path::Path;
 
 use super::Args;
-use rowtone_clip::pts;
-use rowtone_clip::y4m::{Next, Reader};
+use rowtone::camera::Pixels;
+use rowtone_clip::{CameraArgs, Feed, Rect};
 use rowtone_failure::Failure;
 
 /// The value of white: 255, or all ones of the depth that the values need.
@@ -39,12 +37,7 @@ pub(super) fn each_picture(
             picture_rows: Some(height),
         });
     }
-    if name == "-" {
-        return each_frame(args, "standard input", io::stdin().lock(), sink);
-    }
-    let file =
-        File::open(name).map_err(|e| Failure::input(format!("{name}: cannot be opened: {e}")))?;
-    each_frame(args, name, io::BufReader::new(file), sink)
+    each_frame(args, name, sink)
 }
 
 /// By its extension.
@@ -98,68 +91,51 @@ fn picture(
     Ok((width, height))
 }
 
-/// The frames of a Y4M stream.
+/// The frames of a video.
 fn each_frame(
     args: &Args,
     name: &str,
-    from: impl Read,
     mut sink: impl FnMut(&[u16], usize),
 ) -> Result<Info, Failure> {
-    let mut reader = Reader::open(from, name)?;
-    let (width, height, bits) = (
-        reader.header().width,
-        reader.header().height,
-        reader.header().format.bits,
-    );
-    let fps = args.fps.or(reader.header().fps);
-    let given: Option<Vec<i64>> = args.pts.as_deref().map(pts::read).transpose()?;
-    let mut buffer = Vec::new();
-    let mut values = vec![0u16; width * height];
-    let mut count = 0;
-    while count < args.frames {
-        match reader.read_frame(&mut buffer)? {
-            Next::Frame { luma } => {
-                let bytes = &buffer[luma..];
-                if bits > 8 {
-                    for (value, pair) in values.iter_mut().zip(bytes.chunks_exact(2)) {
-                        *value = u16::from_le_bytes([pair[0], pair[1]]);
-                    }
-                } else {
-                    for (value, &byte) in values.iter_mut().zip(bytes) {
-                        *value = u16::from(byte);
-                    }
-                }
-                hand_out(args, &values, width, height, &mut sink)?;
-                count += 1;
-            }
-            Next::End => break,
-            Next::Truncated { have, need } => {
-                eprintln!(
-                    "rowtone: warning: {name}: ends inside frame {count} ({have} of {need} bytes)"
-                );
-                break;
-            }
-        }
-    }
-    let times_s = match (given, fps) {
-        (Some(times), _) if times.len() < count => {
-            return Err(Failure::input(format!(
-                "{name}: {count} frames, but only {} times in --pts",
-                times.len()
-            )));
-        }
-        (Some(times), _) => Some(
-            times[..count]
-                .iter()
-                .map(|&t| (t - times[0]) as f64 * 1e-9)
-                .collect(),
-        ),
-        (None, Some(fps)) => Some((0..count).map(|n| n as f64 / fps).collect()),
-        (None, None) => None,
+    let options = CameraArgs {
+        fps: args.fps,
+        pts: args.pts.clone(),
+        // The line time is what is looked for.
+        global_shutter: true,
+        ..CameraArgs::of(name)
     };
+    let mut feed = Feed::open(&options)?;
+    for note in &feed.notes {
+        eprintln!("rowtone: {}: {note}", feed.name);
+    }
+    let (width, height) = feed.camera.size;
+    let whole = Rect::whole(width, height);
+    let mut values = Vec::new();
+    let mut starts_ns = Vec::new();
+    while starts_ns.len() < args.frames {
+        let Some(frame) = feed.next_frame()? else {
+            break;
+        };
+        values.clear();
+        for row in 0..height {
+            match frame.pixels(&whole, row) {
+                Pixels::U8(row) => values.extend(row.iter().map(|&value| u16::from(value))),
+                Pixels::U16(row) => values.extend_from_slice(row),
+                Pixels::Upper(row) => values.extend(row.iter().map(u16::from)),
+            }
+        }
+        hand_out(args, &values, width, height, &mut sink)?;
+        starts_ns.push(frame.start_ns);
+        feed.recycle(frame);
+    }
+    if let Some(warning) = feed.warning() {
+        eprintln!("rowtone: warning: {warning}");
+    }
+    let first = starts_ns.first().copied().unwrap_or(0);
+    let times = starts_ns.iter().map(|&start| (start - first) as f64 * 1e-9);
     Ok(Info {
-        times_s: times_s.filter(|t: &Vec<f64>| t.len() > 1),
-        fps,
+        times_s: (starts_ns.len() > 1).then(|| times.collect()),
+        fps: Some(feed.camera.fps),
         picture_rows: Some(height),
     })
 }
