@@ -94,7 +94,8 @@ mod tests {
             let orbit = Orbit::of([x, y]);
             let mut largest = 0.0_f32;
             for step in 0..2000_u16 {
-                let e = Complex::from_polar(1.0, f32::from(step) * 0.001 * core::f32::consts::PI);
+                let angle = f32::from(step) * 0.001 * core::f32::consts::PI;
+                let e = Complex::new(libm::cosf(angle), libm::sinf(angle));
                 let square = (x * e).re.powi(2) + (y * e).re.powi(2);
                 largest = largest.max(square.sqrt());
             }
