@@ -11,6 +11,8 @@ pub struct Counts {
     pub no_texture: u64,
     /// Unlike their reference.
     pub occluded: u64,
+    /// With less than an eighth of their reference's light.
+    pub unlit: u64,
     /// Of another width, or of a row that is not there.
     pub misfit: u64,
     /// How often the scene changed and the reference was learned again.

@@ -1,8 +1,12 @@
 //! Learning the reference, in two rounds of frames.
 
 use super::{
-    Place, Planar, Rejected, Stage, Tracker, check::Check, correlate::Correlator,
+    Place, Planar, Rejected, Stage, Tracker,
+    check::Check,
+    correlate::{Correlator, whole_sums},
     predict::Prediction,
+    residual::likeness,
+    vetting::{UNLIT, Vetting},
 };
 use crate::{
     camera::pixel::Pixel,
@@ -16,6 +20,10 @@ const OWN_INFORMATION_PER_PX2: f32 = 25.0;
 /// One row in so many measures the pixels' noise, in turns.
 const NOISE_ROWS: usize = 4;
 
+/// In the second round, a row so many times further than the range of the first and this more is not learned, px.
+const BEYOND: f32 = 2.0;
+const BEYOND_PX: f32 = 4.0;
+
 /// Motion below this stays within the rows' polynomials, px.
 const SMALL_MOTION_PX: f32 = 0.6;
 
@@ -27,7 +35,8 @@ impl Tracker<'_> {
         self.frame = None;
         self.schedule.fast_path.end();
         self.frames_in_stage = 0;
-        self.range_px = 0.0;
+        self.vetting = Vetting::default();
+        self.range_px = f32::INFINITY;
         self.light.to_reference = 1.0;
         self.prediction = Prediction::default();
         self.curvature = Curvature::default();
@@ -94,7 +103,8 @@ impl Tracker<'_> {
         self.curvature = Curvature::of_per_px2(self.store.usual_curvature_per_px2());
         self.blur.end_round();
         self.meter = NoiseMeter::default();
-        self.range_px = 0.0;
+        self.range_px = self.vetting.range_px();
+        self.vetting.end_round();
         self.frames_in_stage = 0;
         self.frame = None;
         self.schedule.fast_path.end();
@@ -110,12 +120,17 @@ impl Tracker<'_> {
         pixels: &[P],
         found: Result<Place, Rejected>,
     ) {
+        self.vet(row, pixels, found);
         let mut textured = false;
         let shift_px = match found {
             Ok(Place {
                 shift_px,
                 information_per_px2,
             }) if information_per_px2 > OWN_INFORMATION_PER_PX2 => {
+                if shift_px.abs() > BEYOND * self.range_px + BEYOND_PX {
+                    // A frame that is elsewhere for once.
+                    return;
+                }
                 textured = true;
                 self.prediction.note_extent(shift_px, information_per_px2);
                 #[cfg(feature = "long-exposure")]
@@ -124,14 +139,15 @@ impl Tracker<'_> {
                 }
                 shift_px
             }
-            Ok(_) | Err(Rejected::NoTexture) => self.prediction.at(row),
+            Ok(_) => self.prediction.at(row),
+            Err(Rejected::NoTexture) if self.is_lit(row, pixels) => self.prediction.at(row),
             Err(_) => return,
         };
         let Some(&seen) = self.store.learning(row) else {
             return;
         };
         if self.prediction.is_sure() {
-            self.range_px = self.range_px.max(self.prediction.at(row).abs());
+            self.vetting.note_extent(self.prediction.at(row));
         }
         if row.is_multiple_of(8) {
             self.store.note_activity(pixels);
@@ -155,6 +171,40 @@ impl Tracker<'_> {
                 self.store.build(row);
             }
         }
+    }
+
+    /// The frame is vetted by its rows, before they are learned.
+    fn vet<P: Pixel>(&mut self, row: usize, pixels: &[P], found: Result<Place, Rejected>) {
+        let seen = self.store.learning(row).is_some_and(|l| l.frames > 0);
+        if self.stage != Stage::Rough || !seen {
+            self.vetting.note_light(1.0);
+            return;
+        }
+        let (information, shift_px) = match found {
+            Ok(place) => (place.information_per_px2, place.shift_px),
+            Err(Rejected::Occluded) => (OWN_INFORMATION_PER_PX2, self.prediction.at(row)),
+            Err(_) => (0.0, 0.0),
+        };
+        let to_reference = self.factor_to_reference(row, pixels);
+        self.vetting.note_light(to_reference);
+        if information >= OWN_INFORMATION_PER_PX2
+            && let Some(likeness) = likeness(&self.store, row, pixels, shift_px)
+        {
+            self.vetting.note_row(likeness, shift_px, information);
+        }
+    }
+
+    /// The factor that brings a whole line to its reference's brightness, wherever it lies.
+    fn factor_to_reference<P: Pixel>(&self, row: usize, pixels: &[P]) -> f32 {
+        match (self.store.table(row), whole_sums(&self.store, row, &pixels)) {
+            (Some(table), Some((_, sum))) => table.factor_to_reference(sum),
+            _ => 1.0,
+        }
+    }
+
+    /// The line is not too dark to be learned from.
+    fn is_lit<P: Pixel>(&self, row: usize, pixels: &[P]) -> bool {
+        self.factor_to_reference(row, pixels) <= UNLIT
     }
 
     pub(super) fn measure_noise<P: Pixel>(
@@ -189,7 +239,10 @@ impl Tracker<'_> {
 
     /// Small motion stays within the polynomial and needs no margin.
     fn settle_margin(&mut self) {
-        let range = self.range_px.min(f32::from(self.config.width / 3));
+        let range = self
+            .vetting
+            .range_px()
+            .min(f32::from(self.config.width / 3));
         self.store.set_margin_px(if range < SMALL_MOTION_PX {
             0
         } else {

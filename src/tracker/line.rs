@@ -10,6 +10,7 @@ use super::{
     predict::Prediction,
     row::{Row, Scattered, Summed},
     schedule::{FastPath, FastRows},
+    vetting::UNLIT,
 };
 use crate::{
     camera::pixel::Pixel,
@@ -51,6 +52,8 @@ pub(super) enum Rejected {
     Learning,
     NoTexture,
     Occluded,
+    /// Too dark beside its reference.
+    Unlit,
     Misfit,
 }
 
@@ -309,6 +312,7 @@ impl Tracker<'_> {
         let count = match found {
             Ok(_) => &mut counts.measured,
             Err(Rejected::Occluded) => &mut counts.occluded,
+            Err(Rejected::Unlit) => &mut counts.unlit,
             Err(_) => &mut counts.no_texture,
         };
         *count = count.wrapping_add(1);
@@ -324,7 +328,8 @@ impl Tracker<'_> {
     /// motion is swift, and at the beginning of a frame.
     fn settle_fast_path(&mut self, frame: u32) {
         // Where lines are expected then stays between the shifts of those before, none of which is further than `near_px`.
-        let near = self.prediction.predicted_px().abs() < self.correlator.here_px;
+        let near = self.prediction.predicted_px().abs() < self.correlator.here_px
+            && self.light.to_reference <= UNLIT;
         let unhindered = !self.store.is_moving() && !self.check.is_searching();
         let at_rest = unhindered && self.prediction.is_at_rest() && self.light.is_settled() && near;
         let rows = usize::from(self.config.rows);
@@ -366,55 +371,6 @@ impl Tracker<'_> {
         }
     }
 
-    /// Once a frame: the reference follows a picture that creeps.
-    fn follow_drift(&mut self) {
-        if self.prediction.is_sure()
-            && let Some(by_px) = self.store.follow_drift(self.prediction.at(0))
-        {
-            self.prediction.move_by(-by_px);
-        }
-    }
-
-    #[cold]
-    fn next_frame(&mut self, frame: u32, start_ns: i64) {
-        if self.stage == Stage::Tracking {
-            if self.check.end_frame(start_ns) {
-                self.counts.relearned = self.counts.relearned.saturating_add(1);
-                self.relearn();
-            } else {
-                self.follow_drift();
-            }
-        } else if self.frame.is_some() && self.frames_in_stage >= self.config.learn_frames {
-            self.end_round();
-        }
-        if self.stage == Stage::Rough && self.frames_in_stage.is_power_of_two() {
-            self.settle_noise();
-        }
-        // The rows beside a row must have been seen before its second product can be built.
-        let seen = self.frames_in_stage;
-        if self.store.is_planar() && self.stage == Stage::Rough && matches!(seen, 1 | 4 | 16) {
-            self.store.build_all();
-            self.planar.end_round(self.store.usual_curvatures_per_px2());
-        }
-        self.frames_in_stage = self.frames_in_stage.saturating_add(1);
-        self.frame = Some(frame);
-        self.schedule.turn = match self.stage {
-            Stage::Tracking => self.store.turn_of(frame, self.is_hurried()),
-            Stage::Rough | Stage::Refining => usize::MAX,
-        };
-        self.prediction
-            .begin_frame(start_ns, self.stage != Stage::Rough);
-        #[cfg(feature = "long-exposure")]
-        self.paths
-            .begin_frame(start_ns, self.stage == Stage::Refining);
-        #[cfg(feature = "long-exposure")]
-        self.look_ahead();
-        self.check.begin_frame(frame);
-        self.schedule.next_check = 0;
-        self.schedule.background = self.store.is_busy() || self.check.is_searching();
-        self.light.begin_frame();
-    }
-
     /// Place of a line against the reference, whose row lies `aside_px` to the left of the others.
     fn locate<R: Row>(
         &mut self,
@@ -450,6 +406,10 @@ impl Tracker<'_> {
                 return Err(Rejected::Occluded);
             }
         };
+        if self.light.to_reference > UNLIT {
+            self.light.to_reference = before;
+            return Err(Rejected::Unlit);
+        }
         let surprise = shift_px - expected;
         // After two inner products there is no time for it where it is but its turn; the next one will do.
         let in_turn = row >= self.schedule.next_check

@@ -14,6 +14,7 @@ mod check;
 mod config;
 mod correlate;
 mod counts;
+mod frame;
 mod gap;
 mod learn;
 mod light;
@@ -29,6 +30,7 @@ mod schedule;
 mod search;
 #[cfg(test)]
 mod tests;
+mod vetting;
 
 pub use crate::reference::{
     ColumnLearning, RowLearning, StaticStorage, StaticVerticalStorage, Storage, VerticalStorage,
@@ -52,6 +54,7 @@ use planar::Planar;
 use predict::Prediction;
 use row::Row;
 use schedule::Schedule;
+use vetting::Vetting;
 
 /// The outcome of a line.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -64,6 +67,8 @@ pub enum Outcome {
     NoTexture,
     /// The line does not look like its reference: something passes through the picture.
     Occluded,
+    /// The line has less than an eighth of its reference's light.
+    Unlit,
     /// The line has another width, or a row that is not there.
     Misfit,
 }
@@ -96,7 +101,8 @@ pub struct Tracker<'a> {
     #[cfg(feature = "long-exposure")]
     paths: path::Paths,
     meter: NoiseMeter,
-    /// Largest shift met in this round, px.
+    vetting: Vetting,
+    /// Largest shift of the round before, px; beyond reach in the first round.
     range_px: f32,
     check: Check,
     correlator: Correlator,
@@ -145,7 +151,8 @@ impl<'a> Tracker<'a> {
                 config.columns_per_line != u16::MAX,
             ),
             meter: NoiseMeter::default(),
-            range_px: 0.0,
+            vetting: Vetting::default(),
+            range_px: f32::INFINITY,
             check: Check::new(search::starts(&config)),
             correlator: Correlator::learning(config.stride),
             schedule: Schedule::new(),
@@ -312,6 +319,7 @@ impl<'a> Tracker<'a> {
             Err(Rejected::Learning) => Outcome::Learning,
             Err(Rejected::NoTexture) => Outcome::NoTexture,
             Err(Rejected::Occluded) => Outcome::Occluded,
+            Err(Rejected::Unlit) => Outcome::Unlit,
             Err(Rejected::Misfit) => Outcome::Misfit,
         }
     }

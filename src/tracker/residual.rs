@@ -106,3 +106,35 @@ impl Residual {
         })
     }
 }
+
+/// How a line of `row` at `shift_px` correlates with its reference, −1 to 1; `None` where one of them is even.
+pub(super) fn likeness<P: Pixel>(
+    store: &Store<'_>,
+    row: usize,
+    pixels: &[P],
+    shift_px: f32,
+) -> Option<f32> {
+    let mean = store.mean(row)?;
+    let overlap = Overlap::new(
+        mean.len(),
+        nearest_step(shift_px, store.recipe().stride as i32),
+    )?;
+    let (mean, line) = (mean.get(overlap.reference)?, pixels.get(overlap.line)?);
+    let value = 1.0 / store.recipe().counts_per_value;
+    let both = || {
+        let pairs = mean.iter().zip(line);
+        pairs.map(|(&m, p)| (f32::from(m) * value, f32::from(p.value())))
+    };
+    let (sum_m, sum_p) = both().fold((0.0, 0.0), |(a, b), (m, p)| (a + m, b + p));
+    let per_pixel = 1.0 / mean.len() as f32;
+    let (mean_m, mean_p) = (sum_m * per_pixel, sum_p * per_pixel);
+    let (mut mm, mut pp, mut mp) = (0.0f32, 0.0f32, 0.0f32);
+    for (m, p) in both() {
+        let (m, p) = (m - mean_m, p - mean_p);
+        mm += m * m;
+        pp += p * p;
+        mp += m * p;
+    }
+    let likeness = mp / crate::kernel::sqrtf(mm * pp);
+    likeness.is_finite().then_some(likeness)
+}
