@@ -12,6 +12,8 @@ pub struct RowLearning {
     smear: u16,
     /// Mean brightness of the lines against the reference.
     pub(super) light: f32,
+    /// Print of the row's last line; 0 where its coefficients are others since.
+    pub(super) print: u32,
 }
 
 /// What learning keeps of a column.
@@ -37,6 +39,7 @@ impl RowLearning {
         #[cfg(feature = "long-exposure")]
         smear: 0,
         light: 0.0,
+        print: 0,
     };
 
     pub(crate) fn frames(&self) -> u16 {

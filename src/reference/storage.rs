@@ -13,8 +13,8 @@ pub(crate) struct BufferTooShort {
     pub(crate) needs: usize,
 }
 
-/// Memory of a tracker, lent by the caller: 3·width + 24 bytes a row, and 16 bytes a column. The line
-/// path itself reads width + 16 bytes a row.
+/// Memory of a tracker, lent by the caller: 3·width + 32 bytes a row, and 16 bytes a column. The line
+/// path itself reads width + 20 bytes a row.
 #[derive(Debug)]
 pub struct Storage<'a> {
     /// width × rows: the coefficients of the inner products, as the kernel keeps them
@@ -124,7 +124,7 @@ fn cut<'a, T>(
 /// ```
 /// use rowtone::{camera::Timing, tracker::{Config, StaticStorage, Tracker}};
 /// let mut storage = Box::new(StaticStorage::<{ 320 * 240 }, 240, 320>::new());
-/// assert!(core::mem::size_of_val(&*storage) <= 3 * 320 * 240 + 28 * 240 + 16 * 320);
+/// assert!(core::mem::size_of_val(&*storage) <= 3 * 320 * 240 + 32 * 240 + 16 * 320);
 /// let config = Config::new(Timing::new(67_200_000, 500_000, 240)?, 320);
 /// let tracker = Tracker::new(config, storage.lend())?;
 /// # Ok::<(), Box<dyn std::error::Error>>(())

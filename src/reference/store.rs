@@ -108,6 +108,20 @@ impl<'a> Store<'a> {
         self.buffers.learning.get_mut(row)
     }
 
+    /// The print of the row's last line; 0 where there is no such row.
+    #[inline(always)]
+    pub(crate) fn print(&self, row: usize) -> u32 {
+        self.buffers.learning.get(row).map_or(0, |l| l.print)
+    }
+
+    /// Keeps the print of a row's line.
+    #[inline(always)]
+    pub(crate) fn set_print(&mut self, row: usize, print: u32) {
+        if let Some(learning) = self.buffers.learning.get_mut(row) {
+            learning.print = print;
+        }
+    }
+
     /// Averages a line into its row, of at most `memory` frames. `shift_px`: of the line against the row, and downwards;
     /// `to_reference`: the factor that brings it to the row's brightness.
     pub(crate) fn average<P: Pixel>(

@@ -13,8 +13,12 @@ pub struct Counts {
     pub occluded: u64,
     /// With less than an eighth of their reference's light.
     pub unlit: u64,
+    /// Copies of the frame before.
+    pub repeated: u64,
     /// Of another width, or of a row that is not there.
     pub misfit: u64,
+    /// Frames all of whose lines were those of the frame before.
+    pub repeated_frames: u32,
     /// How often the scene changed and the reference was learned again.
     pub relearned: u32,
 }

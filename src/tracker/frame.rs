@@ -15,6 +15,9 @@ impl Tracker<'_> {
     /// Closes the frame before, which ended, and begins another.
     #[cold]
     pub(super) fn next_frame(&mut self, frame: u32, start_ns: i64) {
+        if self.copies.end_frame() {
+            self.counts.repeated_frames = self.counts.repeated_frames.saturating_add(1);
+        }
         if self.stage == Stage::Tracking {
             if self.check.end_frame(start_ns) {
                 self.counts.relearned = self.counts.relearned.saturating_add(1);

@@ -8,6 +8,7 @@ use super::{
     Stage, Tracker,
     correlate::{Sums, Unfound, whole_sums},
     predict::Prediction,
+    print,
     row::{Row, Scattered, Summed},
     schedule::{FastPath, FastRows},
     vetting::UNLIT,
@@ -44,6 +45,7 @@ struct Measured {
     /// The factor that brings it to its reference's brightness.
     to_reference: f32,
     information_per_px2: f32,
+    print: u32,
 }
 
 /// Why a line was not measured.
@@ -54,6 +56,8 @@ pub(super) enum Rejected {
     Occluded,
     /// Too dark beside its reference.
     Unlit,
+    /// A copy of the frame before.
+    Repeated,
     Misfit,
 }
 
@@ -172,7 +176,7 @@ impl Tracker<'_> {
             return Err(None);
         }
         let measured = self.measure_fast(usize::from(line.row), pixels)?;
-        Ok(self.accept(measured, times))
+        Ok(self.accept(usize::from(line.row), measured, times))
     }
 
     /// What a line comes to where the picture has moved little; the light as it was with the line before is still there.
@@ -187,12 +191,14 @@ impl Tracker<'_> {
             return Err(None);
         }
         let (product, sum) = pixels.sums(self.config.kernel, coefficients);
+        let print = print::of_sums((product, sum));
         let to_reference = table.factor_to_reference(sum);
         let shift_px = table.shift_px(product * to_reference);
         let surprise_px = shift_px - self.prediction.predicted_px();
         // Neither is true of what is no number.
         let small = shift_px.abs() <= self.correlator.near_px && Prediction::is_small(surprise_px);
-        if !small || !self.light.may_become(to_reference) {
+        let repeated = self.store.print(row) == print;
+        if !small || repeated || !self.light.may_become(to_reference) {
             return Err(Some((product, sum)));
         }
         Ok(Measured {
@@ -200,17 +206,20 @@ impl Tracker<'_> {
             surprise_px,
             to_reference,
             information_per_px2: table.information_per_px2(),
+            print,
         })
     }
 
     #[inline(always)]
-    fn accept(&mut self, measured: Measured, times: bool) -> Place {
+    fn accept(&mut self, row: usize, measured: Measured, times: bool) -> Place {
         let Measured {
             shift_px,
             surprise_px,
             to_reference,
             information_per_px2,
+            print,
         } = measured;
+        self.store.set_print(row, print);
         if times {
             self.light.add_settled(to_reference);
         }
@@ -255,7 +264,7 @@ impl Tracker<'_> {
             // The reference is not being moved.
             self.work_in_background::<R::P>(row);
         }
-        let place = self.accept(measured, times);
+        let place = self.accept(row, measured, times);
         self.settle_fast_path(line.frame);
         Ok(place)
     }
@@ -313,6 +322,7 @@ impl Tracker<'_> {
             Ok(_) => &mut counts.measured,
             Err(Rejected::Occluded) => &mut counts.occluded,
             Err(Rejected::Unlit) => &mut counts.unlit,
+            Err(Rejected::Repeated) => &mut counts.repeated,
             Err(_) => &mut counts.no_texture,
         };
         *count = count.wrapping_add(1);
@@ -394,6 +404,14 @@ impl Tracker<'_> {
         }
         let information_per_px2 = table.information_per_px2();
         let expected = self.prediction.at(row) + aside_px;
+        let sums = if expected.abs() < self.correlator.here_px {
+            sums.or_else(|| whole_sums(&self.store, row, pixels))
+        } else {
+            None
+        };
+        if self.is_repeated(row, pixels, sums) {
+            return Err(Rejected::Repeated);
+        }
         if self.store.is_planar() {
             self.begin_planar(row, pixels.pixels(), expected);
         }
@@ -466,6 +484,36 @@ impl Tracker<'_> {
         let (store, light) = (&self.store, &mut self.light);
         self.correlator
             .find(store, light, row, pixels, expected_px, sums, hurried)
+    }
+
+    /// The line is that of the frame before, in a frame that may be a copy; its print is kept.
+    pub(super) fn is_repeated<R: Row>(&mut self, row: usize, pixels: &mut R, sums: Sums) -> bool {
+        // While learning the coefficients change, and the sums with them.
+        let by_sums = sums.filter(|_| self.stage == Stage::Tracking);
+        let print = match by_sums {
+            Some(sums) => print::of_sums(sums),
+            None => print::of_pixels(pixels.pixels()),
+        };
+        let before = self.store.print(row);
+        self.store.set_print(row, print);
+        if !self.copies.may_be() {
+            return false;
+        }
+        if before == 0 {
+            // The row was built again meanwhile.
+            return self.copies.seems();
+        }
+        // The row of the frame before may have been read the other way.
+        let repeated = before == print
+            || match by_sums {
+                Some(_) => before == print::of_pixels(pixels.pixels()),
+                None => {
+                    let sums = whole_sums(&self.store, row, pixels);
+                    sums.is_some_and(|sums| before == print::of_sums(sums))
+                }
+            };
+        self.copies.note(repeated);
+        repeated
     }
 
     /// A row without texture tells of the light too, where it is neither dark nor near to being clipped.

@@ -24,6 +24,7 @@ mod overlap;
 mod path;
 mod planar;
 mod predict;
+mod print;
 mod residual;
 mod row;
 mod schedule;
@@ -52,6 +53,7 @@ use light::Light;
 use line::{Place, Rejected};
 use planar::Planar;
 use predict::Prediction;
+use print::Copies;
 use row::Row;
 use schedule::Schedule;
 use vetting::Vetting;
@@ -69,6 +71,8 @@ pub enum Outcome {
     Occluded,
     /// The line has less than an eighth of its reference's light.
     Unlit,
+    /// The line is a copy, in a frame all of whose lines so far are those of the frame before.
+    Repeated,
     /// The line has another width, or a row that is not there.
     Misfit,
 }
@@ -102,6 +106,7 @@ pub struct Tracker<'a> {
     paths: path::Paths,
     meter: NoiseMeter,
     vetting: Vetting,
+    copies: Copies,
     /// Largest shift of the round before, px; beyond reach in the first round.
     range_px: f32,
     check: Check,
@@ -152,6 +157,7 @@ impl<'a> Tracker<'a> {
             ),
             meter: NoiseMeter::default(),
             vetting: Vetting::default(),
+            copies: Copies::default(),
             range_px: f32::INFINITY,
             check: Check::new(search::starts(&config)),
             correlator: Correlator::learning(config.stride),
@@ -320,6 +326,7 @@ impl<'a> Tracker<'a> {
             Err(Rejected::NoTexture) => Outcome::NoTexture,
             Err(Rejected::Occluded) => Outcome::Occluded,
             Err(Rejected::Unlit) => Outcome::Unlit,
+            Err(Rejected::Repeated) => Outcome::Repeated,
             Err(Rejected::Misfit) => Outcome::Misfit,
         }
     }

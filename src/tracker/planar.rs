@@ -14,8 +14,10 @@ use super::{
     correlate::whole_sums,
     overlap::{Overlap, nearest_step},
     predict::Prediction,
+    print,
     row::{Row, Summed},
     schedule::FastRows,
+    vetting::UNLIT,
 };
 use crate::{
     camera::Line,
@@ -183,11 +185,18 @@ impl Tracker<'_> {
         if !self.store.vertical_table(row).is_some_and(knows) {
             return Err(Rejected::NoTexture);
         }
+        if self.is_repeated(row, pixels, None) {
+            return Err(Rejected::Repeated);
+        }
         let Some((_, sum)) = whole_sums(&self.store, row, pixels) else {
             return Err(Rejected::NoTexture);
         };
         let before =
             core::mem::replace(&mut self.light.to_reference, table.factor_to_reference(sum));
+        if self.light.to_reference > UNLIT {
+            self.light.to_reference = before;
+            return Err(Rejected::Unlit);
+        }
         let shift_px = self.prediction.at(row) + aside_px;
         self.begin_planar(row, pixels.pixels(), shift_px);
         if row >= self.schedule.next_check || !self.light.may_have_been(before) {
@@ -239,7 +248,9 @@ impl Tracker<'_> {
         let surprise_px = upright_px - self.prediction.predicted_px();
         let small =
             upright_px.abs() <= self.correlator.near_px && Prediction::is_small(surprise_px);
-        if !small || !self.light.may_become(to_reference) {
+        let print = print::of_sums((first, sum));
+        let repeated = self.store.print(row) == print;
+        if !small || repeated || !self.light.may_become(to_reference) {
             return None;
         }
         let (shift_px, vertical) = planar.settle(upright_px, second, vertical_table);
@@ -255,6 +266,7 @@ impl Tracker<'_> {
             information_per_px2,
         };
         self.planar = planar;
+        self.store.set_print(row, print);
         if times {
             self.light.add_settled(to_reference);
         }
