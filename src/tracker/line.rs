@@ -451,6 +451,10 @@ impl Tracker<'_> {
             };
             shift_px = checked;
             jumped = (shift_px - expected).abs() > JUMP_PX;
+            if jumped && !self.may_jump(row, pixels.pixels(), shift_px, expected) {
+                self.note_fit(false);
+                return Err(Rejected::Occluded);
+            }
         }
         if self.prediction.is_swift() && aside_px == 0.0 {
             shift_px = self.unsmear(row, &table, pixels.pixels(), shift_px);
@@ -469,6 +473,22 @@ impl Tracker<'_> {
             shift_px,
             information_per_px2,
         })
+    }
+
+    /// A line that lies far from where the rows before it led may have been read at a false place: noise, a codec's
+    /// blocks or another edge may fit nearly as well. The rows below would inherit that, so it must fit much better.
+    #[cold]
+    fn may_jump<P: Pixel>(&self, row: usize, pixels: &[P], to_px: f32, from_px: f32) -> bool {
+        if !self.prediction.is_sure() || self.stage == Stage::Rough {
+            return true;
+        }
+        match (
+            self.residual(row, pixels, to_px),
+            self.residual(row, pixels, from_px),
+        ) {
+            (Some(there), Some(here)) => there.is_better_than(&here),
+            _ => true,
+        }
     }
 
     /// The place of a line near `expected_px`; its light is noted.

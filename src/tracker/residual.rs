@@ -12,12 +12,23 @@ pub(super) struct Residual {
     pub(super) power: f32,
     /// Mean square that an error of the shift of 1 px would leave.
     pub(super) slope_power: f32,
+    /// Number of columns that were read.
+    columns: f32,
 }
+
+/// A line is taken for one that has jumped where that lowers the residual by so many of its own variances, squared:
+/// three standard deviations.
+const BETTER: f32 = 9.0;
 
 impl Residual {
     /// What noise does not explain, as the square of an error of the shift, px².
     pub(super) fn excess_px2(&self) -> f32 {
         (self.power - 2.0).max(0.0) / self.slope_power.max(1e-9)
+    }
+
+    /// The line lies here much rather than where it leaves `other`.
+    pub(super) fn is_better_than(&self, other: &Self) -> bool {
+        self.columns * (other.power - self.power) > BETTER * self.power.max(1.0)
     }
 
     /// What is left of a line of `row` that is shifted to the right and downwards when its shifted reference is taken off. `to_reference`: the factor
@@ -103,6 +114,7 @@ impl Residual {
         (read >= 4).then_some(Self {
             power: power * own,
             slope_power: slopes * own * slope_px * slope_px,
+            columns: f32::from(read),
         })
     }
 }
