@@ -6,6 +6,11 @@ use crate::{
     reference::{Store, noise::LEAST_VARIANCE},
 };
 
+/// Parts of a line, each of which may have a brightness of its own under a shadow, and between what shares of the line's.
+const PARTS: usize = 4;
+const DARKEST: f32 = 0.6;
+const BRIGHTEST: f32 = 1.6;
+
 /// The residual of a line, per pixel and in units of the pixels' variance.
 pub(super) struct Residual {
     /// Mean square.
@@ -31,9 +36,10 @@ impl Residual {
         self.columns * (other.power - self.power) > BETTER * self.power.max(1.0)
     }
 
-    /// What is left of a line of `row` that is shifted to the right and downwards when its shifted reference is taken off. `to_reference`: the factor
-    /// that brings it to its reference's brightness; about so many `columns` are read.
-    pub(super) fn of<P: Pixel>(
+    /// What is left of a line of `row` that is shifted to the right and downwards when its shifted reference is taken
+    /// off. `to_reference`: the factor that brings it to its reference's brightness; about so many `columns` are read.
+    /// `SHADED`: a soft shadow may lie on it, so that each quarter has a brightness of its own.
+    pub(super) fn of<const SHADED: bool, P: Pixel>(
         store: &Store<'_>,
         row: usize,
         pixels: &[P],
@@ -72,6 +78,9 @@ impl Residual {
         let saturation = r.saturation * r.counts_per_value;
         let per_count = r.noise.per_value * value;
         let (mut power, mut slopes, mut read) = (0.0f32, 0.0f32, 0u16);
+        let (mut part, mut fitted) = (Part::default(), 0u16);
+        let part_columns = n.div_ceil(PARTS);
+        let mut part_end = part_columns;
         // Not at the very edge, which a reference that was moved does not know.
         let mut next = step / 2;
         while next < n {
@@ -96,7 +105,7 @@ impl Residual {
             if let Some(beside) = &beside {
                 model -= beside.less(first + from + x, here);
             }
-            let residual = f32::from(p.value()) - gain * model;
+            let value = f32::from(p.value());
             let variance = r.noise.dark + per_count * here;
             let weight = 1.0
                 / if variance > LEAST_VARIANCE {
@@ -104,10 +113,25 @@ impl Residual {
                 } else {
                     LEAST_VARIANCE
                 };
-            power += residual * residual * weight;
+            if SHADED {
+                if x >= part_end {
+                    power += core::mem::take(&mut part).residual(gain);
+                    part_end += part_columns;
+                    fitted += 1;
+                }
+                part.add(value, model, weight);
+            } else {
+                let residual = value - gain * model;
+                power += residual * residual * weight;
+            }
             slopes += slope * slope * weight;
             read += 1;
         }
+        if SHADED {
+            power += part.residual(gain);
+            fitted += 1;
+        }
+        let read = read.checked_sub(fitted)?;
         let frames = f32::from(store.learning(row)?.frames());
         let own = 1.0 / (f32::from(read) * (1.0 + 1.0 / frames));
         let slope_px = 0.5 * value / r.stride as f32;
@@ -116,6 +140,30 @@ impl Residual {
             slope_power: slopes * own * slope_px * slope_px,
             columns: f32::from(read),
         })
+    }
+}
+
+/// Weighted moments of a part of a line and its model.
+#[derive(Clone, Copy, Debug, Default)]
+struct Part {
+    pp: f32,
+    pm: f32,
+    mm: f32,
+}
+
+impl Part {
+    fn add(&mut self, pixel: f32, model: f32, weight: f32) {
+        self.pp += weight * pixel * pixel;
+        self.pm += weight * pixel * model;
+        self.mm += weight * model * model;
+    }
+
+    /// What is left at the brightness that suits the part, near that of the whole line, `gain`.
+    fn residual(self, gain: f32) -> f32 {
+        let own = self.pm / self.mm;
+        // Not `clamp`, which panics where the limits are no numbers.
+        let own = own.max(DARKEST * gain).min(BRIGHTEST * gain);
+        (self.pp - own * (2.0 * self.pm - own * self.mm)).max(0.0)
     }
 }
 

@@ -62,10 +62,26 @@ impl Tracker<'_> {
 
     /// Whether a line of `row` at `shift_px` fits its reference.
     pub(super) fn fits<P: Pixel>(&mut self, row: usize, pixels: &[P], shift_px: f32) -> bool {
-        match self.residual(row, pixels, shift_px) {
+        let fits = match self.residual(row, pixels, shift_px) {
             Some(residual) => self.check.fits(&residual, self.stage),
-            None => false,
-        }
+            None => return false,
+        };
+        fits || self.fits_in_shade(row, pixels, shift_px)
+    }
+
+    /// Whether it does under a soft shadow, which changes the brightness along the line.
+    #[cold]
+    fn fits_in_shade<P: Pixel>(&mut self, row: usize, pixels: &[P], shift_px: f32) -> bool {
+        let (columns, to_reference) = (self.check_columns(), self.light.to_reference);
+        let (store, place_px) = (&self.store, [shift_px, self.planar.down_px()]);
+        let shaded = Residual::of::<true, P>(store, row, pixels, place_px, to_reference, columns);
+        shaded.is_some_and(|residual| self.check.fits(&residual, self.stage))
+    }
+
+    fn check_columns(&self) -> usize {
+        let hurried = self.config.columns_per_line != u16::MAX;
+        let moved = self.correlator.products > 0;
+        self.check.columns(self.stage, hurried, moved)
     }
 
     /// What is left of a line of `row` when its reference, shifted, is taken off.
@@ -75,12 +91,9 @@ impl Tracker<'_> {
         pixels: &[P],
         shift_px: f32,
     ) -> Option<Residual> {
-        let hurried = self.config.columns_per_line != u16::MAX;
-        let moved = self.correlator.products > 0;
-        let columns = self.check.columns(self.stage, hurried, moved);
-        let to_reference = self.light.to_reference;
+        let (columns, to_reference) = (self.check_columns(), self.light.to_reference);
         let place_px = [shift_px, self.planar.down_px()];
-        Residual::of(&self.store, row, pixels, place_px, to_reference, columns)
+        Residual::of::<false, P>(&self.store, row, pixels, place_px, to_reference, columns)
     }
 
     /// Where the next line is searched for while nothing fits, px: outwards from the usual place as by
