@@ -16,6 +16,10 @@ pub struct NoiseMeter {
 
 const BINS: usize = 8;
 
+/// Parts of a line, each of which has a brightness of its own where that differs by more than this share: under a shadow.
+const PARTS: usize = 4;
+const SHADED: f32 = 0.08;
+
 impl NoiseMeter {
     /// Adds what one line leaves over. `beside`: the rows next to `mean`, where the line is displaced along the columns;
     /// `shift_px`: of the line against `mean`; `gain`: its brightness against it; `frames`: how many frames `mean` is the mean of.
@@ -49,23 +53,43 @@ impl NoiseMeter {
         ) else {
             return;
         };
-        let columns = mean.windows(2 * stride + 1).step_by(3);
-        for (k, (around, p)) in columns.zip(pixels.iter().step_by(3)).enumerate() {
-            let &[left, .., right] = around else { return };
-            let here = around.get(stride).copied().unwrap_or(0);
-            let (left, here, right) = (
-                f32::from(left) * value,
-                f32::from(here) * value,
-                f32::from(right) * value,
-            );
-            let slope = (right - left) * per_px;
+        // A reference pixel and its slope, and the line's pixel.
+        let columns = || {
+            let columns = mean.windows(2 * stride + 1).step_by(3);
+            let pairs = columns.zip(pixels.iter().step_by(3));
+            pairs.map_while(|(around, p)| {
+                let &[left, .., right] = around else {
+                    return None;
+                };
+                let here = around.get(stride).copied().unwrap_or(0);
+                let slope = (f32::from(right) * value - f32::from(left) * value) * per_px;
+                Some((f32::from(here) * value, slope, f32::from(p.value())))
+            })
+        };
+        let part = mean.len().div_ceil(3 * PARTS).max(1);
+        let gain_of = |from: usize| {
+            let some = columns().skip(from).take(part);
+            let (line, model) = some.fold((0.0, 0.0), |(line, model), (here, slope, p)| {
+                (line + p, model + (here - near * slope))
+            });
+            let own = line / model;
+            // Neither is true of what is no number.
+            let shaded = (own - gain).abs() > SHADED * gain && own.is_finite();
+            if shaded { own } else { gain }
+        };
+        let (mut own_gain, mut next_part) = (gain_of(0), part);
+        for (k, (here, slope, p)) in columns().enumerate() {
+            if k == next_part {
+                own_gain = gain_of(k);
+                next_part += part;
+            }
             // On a steep edge what is left over is the shift's error, not the pixel's noise.
             let steep = slope * slope > recipe.noise.variance(here) * 16.0;
             let mut model = here - near * slope;
             if let Some(beside) = &beside {
                 model -= beside.less(first + 3 * k, here / value) * value;
             }
-            let residual = f32::from(p.value()) - gain * model;
+            let residual = p - own_gain * model;
             // What does not count goes to a bin of its own: a branch would be foreseen half of the time.
             let bin = select_unpredictable(
                 steep | (here >= recipe.saturation),
