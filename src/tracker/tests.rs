@@ -1,6 +1,8 @@
 //! A tracker in front of a simple picture: each of its parts must do what it is for. What depends on
 //! noise, blur and real sensors is measured by `rowtone sweep lines` and the end-to-end tests.
 
+mod faults;
+
 use super::*;
 use crate::camera::RawFormat;
 use crate::{camera::Timing, reference::band::MAX_HALF};
