@@ -156,6 +156,11 @@ impl Check {
         Some(self.start?.checked_sub(1)? % self.starts)
     }
 
+    /// Columns that a check for a shadow reads: it has more to tell.
+    pub(super) fn columns_in_shade(&self, columns: usize) -> usize {
+        columns.max(COLUMNS_AMONG_FITTING)
+    }
+
     /// Columns that the next check reads. `hurried`: a line time is short; `moved`: the line has moved by whole pixels.
     pub(super) fn columns(&self, stage: Stage, hurried: bool, moved: bool) -> usize {
         match (hurried, moved) {

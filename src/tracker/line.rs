@@ -399,6 +399,10 @@ impl Tracker<'_> {
                     return found;
                 }
             }
+            // The first frame's rows have none yet, but may be delivered twice.
+            if self.stage == Stage::Rough && self.is_repeated(row, pixels, None) {
+                return Err(Rejected::Repeated);
+            }
             self.note_light(row, &table, pixels);
             return Err(Rejected::NoTexture);
         }

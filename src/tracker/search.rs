@@ -72,7 +72,8 @@ impl Tracker<'_> {
     /// Whether it does under a soft shadow, which changes the brightness along the line.
     #[cold]
     fn fits_in_shade<P: Pixel>(&mut self, row: usize, pixels: &[P], shift_px: f32) -> bool {
-        let (columns, to_reference) = (self.check_columns(), self.light.to_reference);
+        let columns = self.check.columns_in_shade(self.check_columns());
+        let to_reference = self.light.to_reference;
         let (store, place_px) = (&self.store, [shift_px, self.planar.down_px()]);
         let shaded = Residual::of::<true, P>(store, row, pixels, place_px, to_reference, columns);
         shaded.is_some_and(|residual| self.check.fits(&residual, self.stage))
