@@ -242,6 +242,7 @@ fn view<'s>(
         row_t,
         own_re,
         own_im,
+        notches: heapless::Vec::new(),
         total_weight: l.total_weight,
         count: l.count,
         length_s: l.length_s,

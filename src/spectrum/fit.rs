@@ -47,6 +47,32 @@ impl Model {
         for (i, tone) in self.tones.iter().enumerate() {
             samples.tabulate(i + 1, tone);
         }
+        samples.set_notches(&self.tones);
+    }
+
+    /// Some tone has a notch.
+    pub(crate) fn has_notches(&self) -> bool {
+        self.tones.iter().any(|t| t.notched)
+    }
+
+    /// The same with the tones free that have a notch, without it, and all others as they are.
+    pub(crate) fn without_notches(&self) -> Self {
+        let mut other = self.clone();
+        for tone in &mut other.tones {
+            tone.frozen = !tone.notched;
+            tone.notched = false;
+        }
+        other
+    }
+
+    /// Takes those tones over from `other`, which are free there.
+    pub(crate) fn take_free(&mut self, other: &Self) {
+        for (own, tone) in self.tones.iter_mut().zip(&other.tones) {
+            if !tone.frozen {
+                *own = *tone;
+                (own.notched, own.frozen) = (true, true);
+            }
+        }
     }
 }
 
@@ -89,7 +115,8 @@ impl Fit {
             .map(|t| 2 * t.shape.count() + if t.modulated { 3 } else { 1 })
             .sum();
         let drift = samples.channels * model.drift_powers;
-        samples.count as f32 - (offsets + drift + fitted) as f32
+        let notches = 4 * offsets * model.tones.iter().filter(|t| t.notched).count();
+        samples.count as f32 - (offsets + drift + fitted + notches) as f32
     }
 
     /// How much of the residual of the last pass is at tone `i` (squared).

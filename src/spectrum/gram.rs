@@ -77,7 +77,8 @@ impl Regressors {
                 regressors.add((0, power, Some(column)), one, Unknown::Drift);
             }
         }
-        for (i, tone) in tones.iter().enumerate() {
+        let free = || tones.iter().enumerate().filter(|(_, t)| !t.frozen);
+        for (i, tone) in free() {
             for j in tone.shape.fitted() {
                 regressors.add((i + 1, 0, Some(j)), one, Unknown::Re);
                 regressors.add((i + 1, 0, Some(j)), Complex::new(0.0, 1.0), Unknown::Im);
@@ -87,7 +88,7 @@ impl Regressors {
                 regressors.add((i + 1, 1, None), turn, Unknown::Frequency);
             }
         }
-        for (i, tone) in tones.iter().enumerate() {
+        for (i, tone) in free() {
             if tone.modulated && !tone.shape.is_zero() {
                 let turn = Complex::new(0.0, -0.5 * core::f32::consts::TAU);
                 regressors.add((i + 1, 2, None), turn, Unknown::Chirp);

@@ -6,6 +6,7 @@
 use num_complex::Complex32 as Complex;
 
 use super::blur::blur;
+use super::notch::{NOTCHES, Notch};
 use super::phase::Frequency;
 use super::rows;
 use super::shape::{BASIS, Coupling, Sight, legendre};
@@ -76,6 +77,8 @@ pub(crate) struct Samples<'a> {
     pub(crate) row_t: &'a mut [f32],
     pub(crate) own_re: &'a mut [f32],
     pub(crate) own_im: &'a mut [f32],
+    /// What is taken out of each series like its mean.
+    pub(crate) notches: heapless::Vec<Notch, NOTCHES>,
     /// Sum of weights.
     pub(crate) total_weight: f32,
     /// Samples with a weight.
@@ -254,7 +257,11 @@ impl Samples<'_> {
         } else {
             0.0
         };
-        rows::center(weight, row, mean)
+        let squares = rows::center(weight, row, mean);
+        if self.notches.is_empty() {
+            return squares;
+        }
+        squares - self.take_notches(series)
     }
 
     /// Leaves the skews of one slot's samples in `row_t`, where there are any; a step of them, ns.

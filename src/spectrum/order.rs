@@ -1,12 +1,16 @@
 //! How many coefficients a tone's shape needs: an F test against what is left with more.
 
 use super::alias::{Scores, ShapeFit};
+use super::fit::Model;
 use super::model::Samples;
 use super::phase::Frequency;
 use super::shape::ORDERS;
 
 /// One-sided deviate of the standard normal distribution that noise exceeds once in 10 000 times.
 const RARE: f32 = 3.72;
+
+/// The same, once in 100.
+const SELDOM: f32 = 2.33;
 
 /// A shape, and how well it does.
 #[derive(Clone, Copy, Debug)]
@@ -35,13 +39,28 @@ impl Residue {
         }
     }
 
+    /// By how much deviations are to be stretched: by the root of what is left for each degree of freedom where noise leaves
+    /// so much in no more than one of 100.
+    pub(crate) fn stretch(&self) -> f32 {
+        if self.exceeds(SELDOM) {
+            crate::math::sqrtf(self.each().max(1.0))
+        } else {
+            1.0
+        }
+    }
+
     /// Noise leaves so much in no more than one of 10 000 (Wilson and Hilferty 1931).
     pub(crate) fn is_more_than_noise(&self) -> bool {
+        self.exceeds(RARE)
+    }
+
+    /// More than a one-sided deviate of the standard normal distribution.
+    fn exceeds(&self, deviate: f32) -> bool {
         if self.freedom <= 0.0 {
             return false;
         }
         let spread = 2.0 / (9.0 * self.freedom);
-        let root = 1.0 - spread + RARE * crate::math::sqrtf(spread);
+        let root = 1.0 - spread + deviate * crate::math::sqrtf(spread);
         self.each() > root * root * root
     }
 }
@@ -58,6 +77,23 @@ pub(crate) fn is_rare(f: f32, d1: f32, d2: f32) -> bool {
 }
 
 impl Samples<'_> {
+    /// One pass: what the tones of `model` leave at the alias frequency of tone `i`. The tables must be at `model`.
+    pub(crate) fn residue(&mut self, model: &Model, i: usize, variance: f32) -> Residue {
+        let Some(tone) = model.tones.get(i) else {
+            return Residue {
+                chi2: 0.0,
+                freedom: 0.0,
+            };
+        };
+        let axes = [true, self.channels > 1];
+        let scores = self.score(model, i, |_| false);
+        let (gain, numbers) = self.free_gain(&scores, tone.frequency, axes);
+        Residue {
+            chi2: gain / variance,
+            freedom: numbers - 2.0 * tone.shape.count() as f32,
+        }
+    }
+
     /// The shape at `at` that the scores ask for: its order grows from 0 while the gain is more than what the higher order
     /// still leaves (never against the noise alone: then orders would grow on whatever the model lacks), looking two
     /// orders ahead. `axes`: those that move. `variance`: the noise's.

@@ -96,6 +96,33 @@ pub(crate) fn less_late_tone(
     }
 }
 
+/// Takes weight·(Re(conj(g₀ + g₁·t)·(re + i·im)) − mean) off the row.
+pub(crate) fn less_notch(
+    row: &mut [f32],
+    weight: &[u16],
+    (re, im): (&[f32], &[f32]),
+    t: &[f32],
+    g: [Complex; 2],
+    mean: f32,
+) {
+    let (rows, rest) = row.as_chunks_mut::<LANES>();
+    let (ws, w_rest) = weight.as_chunks::<LANES>();
+    let (ps, p_rest) = re.as_chunks::<LANES>();
+    let (qs, q_rest) = im.as_chunks::<LANES>();
+    let (ts, t_rest) = t.as_chunks::<LANES>();
+    let one = |w: u16, p: f32, q: f32, t: f32| {
+        let (a, b) = (plus(g[0].re, g[1].re, t), plus(g[0].im, g[1].im, t));
+        unpack_weight(w) * plus(plus(-mean, a, p), b, q)
+    };
+    for ((((r, w), p), q), t) in rows.iter_mut().zip(ws).zip(ps).zip(qs).zip(ts) {
+        lanes!(l => r[l] -= one(w[l], p[l], q[l], t[l]));
+    }
+    let tail = rest.iter_mut().zip(w_rest).zip(p_rest).zip(q_rest);
+    for ((((r, &w), &p), &q), &t) in tail.zip(t_rest) {
+        *r -= one(w, p, q, t);
+    }
+}
+
 /// Σ weight·row.
 pub(crate) fn weighted_sum(weight: &[u16], row: &[f32]) -> f32 {
     let mut sums = [0.0_f32; LANES];
@@ -218,6 +245,12 @@ mod tests {
                 weighted_sum(&weight, &row),
                 (0..n).map(|i| w(i) * row[i]).sum(),
             );
+            let mut notched = row.clone();
+            less_notch(&mut notched, &weight, (&p, &q), &t, [g, g], 0.2);
+            for i in 0..n {
+                let taken = (1.0 + t[i]) * (g.re * p[i] + g.im * q[i]) - 0.2;
+                close(notched[i], row[i] - w(i) * taken);
+            }
             let squares = center(&weight, &mut row, 0.1);
             close(
                 squares,

@@ -96,6 +96,7 @@ impl Search {
         // Each round adds, exchanges or drops a tone; the bound only guards against going round in circles.
         for _ in 0..3 * self.most_tones + 3 {
             if self.add(samples, fit, model, grid, &mut outcome) {
+                self.claim(samples, fit, model);
                 self.stand(samples, fit, model, model.tones.len().saturating_sub(1));
                 continue;
             }
@@ -113,6 +114,12 @@ impl Search {
             }
         }
         fit.refine(samples, model, STEPS);
+        if model.has_notches() {
+            let mut strong = model.without_notches();
+            fit.refine(samples, &mut strong, STEPS);
+            model.take_free(&strong);
+            fit.refine(samples, model, STEPS);
+        }
         if samples.frames < FEW_FRAMES {
             self.drop_drift(samples, fit, model);
         }
@@ -169,6 +176,7 @@ impl Search {
         loop {
             let candidates = detect::candidates(samples, model, grid, self.band, |candidate| {
                 self.is_barred(length_s, &barred, candidate)
+                    || self.is_notched(length_s, model, candidate.frequency)
             });
             let Some(first) = candidates.first().copied() else {
                 return false;
@@ -359,6 +367,7 @@ impl Search {
             }
             let mut trial = model.clone();
             match trial.tones.get_mut(i) {
+                Some(tone) if tone.frozen => break,
                 Some(tone) if !tone.modulated && chirp == 0.0 => tone.modulated = true,
                 Some(tone) if !tone.modulated => {
                     *tone = Tone {
@@ -420,7 +429,7 @@ impl Search {
                 || model
                     .tones
                     .get(i)
-                    .is_none_or(|t| t.modulated || t.shape.count() > 1)
+                    .is_none_or(|t| t.modulated || t.frozen || t.shape.count() > 1)
             {
                 continue;
             }
@@ -492,7 +501,7 @@ impl Search {
         let share = self.threshold(samples, model);
         let regressors = fit.weigh(samples, model);
         let mut weakest: Option<(usize, f32)> = None;
-        for (i, tone) in model.tones.iter().enumerate() {
+        for (i, tone) in model.tones.iter().enumerate().filter(|(_, t)| !t.frozen) {
             let sd = fit
                 .deviation(&regressors, i, samples.length_s, &along_constant(tone))
                 .amplitude_px;

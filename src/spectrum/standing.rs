@@ -60,7 +60,11 @@ impl Search {
         let Some(tone) = model.tones.get(i).copied() else {
             return false;
         };
-        if tone.modulated || samples.knowing().len() < FEWEST_SLOTS || self.tired(fit) {
+        if tone.modulated
+            || tone.notched
+            || samples.knowing().len() < FEWEST_SLOTS
+            || self.tired(fit)
+        {
             return false;
         }
         let variance = model.squares / Fit::freedom(samples, model).max(1.0);
@@ -136,14 +140,85 @@ impl Search {
         })
     }
 
+    /// The newest tone may be what a larger one's shape leaves at its alias frequency. Then it is tried as that; and where the
+    /// larger one's rows hold more still than both tones explain, it goes, and so does all that is there.
+    pub(crate) fn claim(&self, samples: &mut Samples<'_>, fit: &mut Fit, model: &mut Model) {
+        let Some((newest, older)) = model.tones.split_last() else {
+            return;
+        };
+        let power = newest.shape.power();
+        let larger = older.iter().position(|t| {
+            t.shape.power() > power && self.is_image(samples, newest.frequency, t.frequency)
+        });
+        let Some(i) = larger else { return };
+        let variance = model.squares / Fit::freedom(samples, model).max(1.0);
+        let mut without = model.clone();
+        without.tones.pop();
+        fit.refine(samples, &mut without, STEPS);
+        if self.stand(samples, fit, &mut without, i)
+            && without.squares < model.squares + WORTH * variance
+        {
+            *model = without;
+            return;
+        }
+        // What both of them leave there.
+        model.tabulate(samples);
+        fit.passes = fit.passes.saturating_add(1);
+        let mut left = samples.residue(model, i, variance);
+        left.freedom -= model
+            .tones
+            .last()
+            .map_or(0.0, |t| 2.0 * t.shape.count() as f32);
+        if !left.is_more_than_noise() {
+            return;
+        }
+        if let Some(tone) = without.tones.get_mut(i) {
+            (tone.notched, tone.frozen) = (true, true);
+        }
+        // What was found at the other images of it goes too.
+        let own = without
+            .tones
+            .get(i)
+            .map(|t| t.frequency)
+            .unwrap_or_default();
+        let mut at = 0;
+        while at < without.tones.len() {
+            let tone = without.tones.get(at);
+            let image = tone.is_some_and(|t| {
+                t.frequency != own && !t.notched && self.is_image(samples, t.frequency, own)
+            });
+            if image {
+                without.tones.remove(at);
+            } else {
+                at += 1;
+            }
+        }
+        fit.refine(samples, &mut without, STEPS);
+        *model = without;
+    }
+
+    /// Whether something at `at` is hidden by a notch.
+    pub(crate) fn is_notched(&self, length_s: f32, model: &Model, at: Frequency) -> bool {
+        let notched = model.tones.iter().filter(|t| t.notched);
+        notched
+            .into_iter()
+            .any(|t| self.images(length_s, at, t.frequency))
+    }
+
     /// Whether `a` is at an image of `b`: a multiple of the frame rate from it or from its mirror image.
     pub(crate) fn is_image(&self, samples: &Samples<'_>, a: Frequency, b: Frequency) -> bool {
+        let near = a.above(b).abs() * samples.length_s < AS_IMAGE;
+        !near && self.images(samples.length_s, a, b)
+    }
+
+    /// The same, or at `b` itself.
+    fn images(&self, length_s: f32, a: Frequency, b: Frequency) -> bool {
         let Some(fps) = self.band.fps else {
             return false;
         };
         [a.above(b), a.hz() + b.hz()].iter().any(|apart| {
             let away = apart - fps * libm::roundf(apart / fps);
-            away.abs() * samples.length_s < AS_IMAGE
+            away.abs() * length_s < AS_IMAGE
         })
     }
 }

@@ -18,6 +18,10 @@ pub(crate) struct Tone {
     pub(crate) growth: f32,
     /// Another multiple of the frame rate explains it all but as well.
     pub(crate) unsure: bool,
+    /// It stays as it is while others are fitted.
+    pub(crate) frozen: bool,
+    /// What is at its alias frequency is taken out of every series.
+    pub(crate) notched: bool,
     /// `chirp` and `growth` are fitted.
     pub(crate) modulated: bool,
 }
@@ -30,6 +34,8 @@ impl Tone {
             chirp: 0.0,
             growth: 0.0,
             unsure: false,
+            frozen: false,
+            notched: false,
             modulated: false,
         }
     }

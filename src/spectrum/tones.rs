@@ -23,6 +23,12 @@ const NEAR_MULTIPLE: f32 = 1.0;
 /// A tone of which less than this share is left after the projection is ambiguous.
 const KEPT_ENOUGH: f32 = 0.6;
 
+/// Nearer than this many 1/T to an image of a larger tone, a tone is ambiguous.
+const AS_IMAGE: f32 = 1.0;
+
+/// From this power over the noise on it is looked at what a tone's shape leaves at its alias frequency: 20 dB.
+const STRONG: f32 = 100.0;
+
 /// What was found in a window.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Tones {
@@ -74,11 +80,44 @@ impl Telling<'_> {
             tones.row_noise_px =
                 noise * crate::math::sqrtf(f32::from(self.group.rows_per_sample()));
         }
-        let (low, high) = self.asked_hz();
-        let regressors = fit.weigh(samples, model);
         let smear = Smear::of(self.group, self.curvature, model);
         let mut list: heapless::Vec<(Peak, f32), MAX_PEAKS> = heapless::Vec::new();
-        for (i, tone) in model.tones.iter().enumerate() {
+        self.tell(samples, fit, (model, variance), &smear, &mut list);
+        if model.has_notches() {
+            let mut strong = model.without_notches();
+            fit.evaluate(samples, &mut strong);
+            self.tell(samples, fit, (&strong, variance), &smear, &mut list);
+        }
+        largest_first(&mut list);
+        self.doubt_images(samples.length_s, &mut list);
+        tones.more = list.len() > self.config.max_peaks;
+        list.truncate(self.config.max_peaks);
+        for (peak, slope) in &list {
+            let _ = tones.peaks.push(*peak);
+            let _ = tones.hz_per_s.push(*slope);
+        }
+        let (low, high) = self.asked_hz();
+        tones.hidden = self.band.fps.is_some_and(|fps| {
+            let lowest = low.max(self.band.lowest_hz);
+            let first = fps * libm::ceilf(lowest / fps).max(1.0);
+            first <= high.min(self.band.highest_hz)
+        });
+        tones
+    }
+
+    /// The free tones of `model`, with the noise's variance.
+    fn tell(
+        &self,
+        samples: &mut Samples<'_>,
+        fit: &mut Fit,
+        (model, variance): (&Model, f32),
+        smear: &Smear<'_>,
+        list: &mut heapless::Vec<(Peak, f32), MAX_PEAKS>,
+    ) {
+        let noise = crate::math::sqrtf(variance);
+        let (low, high) = self.asked_hz();
+        let regressors = fit.weigh(samples, model);
+        for (i, tone) in model.tones.iter().enumerate().filter(|(_, t)| !t.frozen) {
             let hz = tone.frequency.hz();
             let attenuation = self.group.attenuation(hz);
             if !(low..=high).contains(&hz) || attenuation < LEAST_ATTENUATION {
@@ -93,11 +132,16 @@ impl Telling<'_> {
             let power = samples.total_weight * tone.shape.power() / (4.0 * variance).max(1e-30);
             let amplitude_px = amplitude / attenuation;
             let sd_px = noise * unit.amplitude_px / attenuation;
+            let doubt = if power > STRONG {
+                samples.residue(model, i, variance).stretch()
+            } else {
+                1.0
+            };
             let smeared = smear.correction(amplitude_px, hz);
             let doubt_px = smeared.doubt * amplitude_px;
             let peak = Peak {
                 hz,
-                hz_sd: noise * unit.hz,
+                hz_sd: noise * unit.hz * doubt,
                 amplitude_px: amplitude_px * smeared.scale,
                 amplitude_px_sd: crate::math::sqrtf(sd_px * sd_px + doubt_px * doubt_px),
                 snr_db: 10.0 * libm::log10f(power.max(1e-9)),
@@ -110,19 +154,25 @@ impl Telling<'_> {
                 let _ = list.push((peak, slope));
             }
         }
-        largest_first(&mut list);
-        tones.more = list.len() > self.config.max_peaks;
-        list.truncate(self.config.max_peaks);
-        for (peak, slope) in &list {
-            let _ = tones.peaks.push(*peak);
-            let _ = tones.hz_per_s.push(*slope);
+    }
+
+    /// What is at an image of a larger tone may be that one's, or a tone of its own.
+    fn doubt_images(&self, length_s: f32, list: &mut [(Peak, f32)]) {
+        let Some(fps) = self.band.fps else { return };
+        for i in 1..list.len() {
+            let (larger, rest) = list.split_at_mut(i);
+            let Some((peak, _)) = rest.first_mut() else {
+                return;
+            };
+            peak.ambiguous |= larger.iter().any(|(other, _)| {
+                [peak.hz - other.hz, peak.hz + other.hz]
+                    .iter()
+                    .any(|apart| {
+                        let k = libm::roundf(apart / fps);
+                        k != 0.0 && (apart - k * fps).abs() * length_s < AS_IMAGE
+                    })
+            });
         }
-        tones.hidden = self.band.fps.is_some_and(|fps| {
-            let lowest = low.max(self.band.lowest_hz);
-            let first = fps * libm::ceilf(lowest / fps).max(1.0);
-            first <= high.min(self.band.highest_hz)
-        });
-        tones
     }
 
     /// Lowest and highest frequency that is reported.
