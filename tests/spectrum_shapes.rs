@@ -6,7 +6,7 @@ use rowtone::camera::Timing;
 use rowtone::pipeline::Analyzer;
 use rowtone::report::{Peak, Report};
 use rowtone::spectrum::{Config, StaticStorage};
-use rowtone::timeline::{Group, Sample, rows_per_sample};
+use rowtone::timeline::{Group, Sample, Vertical, rows_per_sample};
 
 type Memory = StaticStorage<8192, 128, 128, 16384, 17>;
 
@@ -68,7 +68,7 @@ fn report(seed: u64, motion: impl Fn(f64, f64) -> f64) -> Report {
 fn only(report: &Report, least_px: f32, what: &str) -> Peak {
     let sure = |p: &&Peak| !p.ambiguous && p.amplitude_px > least_px;
     let peaks: Vec<&Peak> = report.peaks.iter().filter(sure).collect();
-    assert_eq!(peaks.len(), 1, "{what}: {:?}", report.peaks);
+    assert_eq!(peaks.len(), 1, "{what}: {:?}", report);
     *peaks[0]
 }
 
@@ -115,5 +115,119 @@ fn what_is_rigid_stays_as_sure_as_it_was() {
         let bound_px = (2.0_f64 / (60.0 * 29.0)).sqrt() * NOISE_PX;
         let sd = f64::from(peak.amplitude_px_sd);
         assert!((0.9..1.2).contains(&(sd / bound_px)), "{peak:?}");
+    }
+}
+
+/// What happens to a motion (x, y) in a sample of a slot whose texture leans by κ and knows so much of each axis.
+struct Slot {
+    coupling: f64,
+    noise_px: [f64; 2],
+}
+
+/// The same camera where samples know both axes; `motion` gives x and y, px.
+fn planar(seed: u64, motion: impl Fn(f64, f64) -> [f64; 2]) -> Report {
+    let timing = Timing::new(90_000_000, 0, 144).unwrap();
+    let group = Group::new(timing, rows_per_sample(timing, 1000.0, 60, 1 << 16)).unwrap();
+    let mut noise = Noise(seed);
+    for _ in 0..4 {
+        noise.unit();
+    }
+    let slots: Vec<Slot> = (0..group.slots())
+        .map(|_| Slot {
+            coupling: 0.2 * noise.draw(),
+            noise_px: [0, 1].map(|_| NOISE_PX * (0.3 * noise.draw()).exp()),
+        })
+        .collect();
+    let mut memory = Box::new(Memory::new());
+    let mut analyzer = Analyzer::new(Config::default(), group, memory.lend_both()).unwrap();
+    for frame in 0..60_u32 {
+        for (number, slot) in slots.iter().enumerate() {
+            let number = number as u16;
+            let first = f64::from(number) * f64::from(group.rows_per_sample());
+            let eta = (first + 0.5 * f64::from(group.rows_of(number))) / 72.0 - 1.0;
+            let time_ns = (f64::from(frame) * 1e9 / FPS) as i64 + group.middle_ns(number);
+            let [x, y] = motion(time_ns as f64 * 1e-9, eta);
+            let information = slot.noise_px.map(|sd| (1.0 / (sd * sd)) as f32);
+            analyzer.push(Sample {
+                frame,
+                slot: number,
+                curvature: Default::default(),
+                time_ns,
+                shift_px: (x + slot.coupling * y + slot.noise_px[0] * noise.draw()) as f32,
+                information_per_px2: information[0],
+                vertical: Some(Vertical {
+                    shift_px: (y + slot.noise_px[1] * noise.draw()) as f32,
+                    information_per_px2: information[1],
+                    coupling: slot.coupling as f32,
+                    ..Vertical::default()
+                }),
+                spread: group.even_spread(),
+            });
+        }
+    }
+    analyzer.finish().unwrap()
+}
+
+/// Motion along the columns alone, along both axes in phase or not, bending or not: one tone each.
+#[test]
+fn motion_along_the_columns_is_told_too() {
+    type Planar = (&'static str, fn(f64, f64) -> [f64; 2], f64);
+    // The phase and η to px along x and y; the largest that any row moves.
+    let motions: [Planar; 5] = [
+        ("along y", |p, _| [0.0, 0.2 * p.sin()], 0.2),
+        (
+            "across",
+            |p, _| [0.2 * p.sin(), 0.2 * p.sin()],
+            0.08_f64.sqrt(),
+        ),
+        ("an orbit", |p, _| [0.2 * p.sin(), 0.1 * p.cos()], 0.2),
+        ("bends along y", |p, eta| [0.0, 0.2 * eta * p.sin()], 0.2),
+        (
+            "bends along x, moves along y",
+            |p, eta| [0.2 * eta * p.sin(), 0.1 * (p + 1.0).sin()],
+            0.209,
+        ),
+    ];
+    for (what, motion, largest_px) in motions {
+        for (seed, hz) in [(1, 61.3), (2, 131.9), (3, 311.0)] {
+            let what = format!("{what}, {hz} Hz");
+            let report = planar(seed, |t, eta| motion(TAU * hz * t + 0.4, eta));
+            let peak = only(&report, 0.0, &what);
+            let off = (f64::from(peak.hz) - hz) / f64::from(peak.hz_sd);
+            assert!(off.abs() < 4.0, "{what}: {peak:?}");
+            let averaged = hz * TAU * 0.5 * 90e-6 * 5.0;
+            let share = f64::from(peak.amplitude_px) / (largest_px * averaged / averaged.sin());
+            assert!((share - 1.0).abs() < 0.03, "{what}: {peak:?}, {share}");
+        }
+    }
+}
+
+/// Two machines in one picture, one above the other: neither's images are told as sure.
+#[test]
+fn halves_are_two_tones() {
+    for (seed, upper_hz, lower_hz) in [(1, 52.7, 83.3), (2, 131.9, 97.1), (3, 211.3, 40.2)] {
+        let report = report(seed, |t, eta| {
+            let hz = if eta < 0.0 { upper_hz } else { lower_hz };
+            0.2 * (TAU * hz * t).sin()
+        });
+        let sure: Vec<&Peak> = report.peaks.iter().filter(|p| !p.ambiguous).collect();
+        assert_eq!(sure.len(), 2, "{:?}", report.peaks);
+        for hz in [upper_hz, lower_hz] {
+            let near = |p: &&&Peak| (f64::from(p.hz) - hz).abs() < 3.0 * f64::from(p.hz_sd);
+            assert!(sure.iter().any(|p| near(&p)), "{hz} Hz: {sure:?}");
+        }
+    }
+}
+
+/// Two tones of the same alias frequency: both are there, the weaker one in doubt.
+#[test]
+fn a_tone_at_an_image_of_a_larger_one_is_in_doubt() {
+    for seed in 0..4 {
+        let report = report(seed, |t, _| {
+            0.2 * (TAU * 83.3 * t).sin() + 0.05 * (TAU * 143.6 * t).sin()
+        });
+        let hz: Vec<f32> = report.peaks.iter().map(|p| p.hz.round()).collect();
+        assert_eq!(hz, [83.0, 144.0], "{:?}", report.peaks);
+        assert!(!report.peaks[0].ambiguous && report.peaks[1].ambiguous);
     }
 }

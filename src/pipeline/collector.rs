@@ -5,7 +5,7 @@ use crate::math::since;
 use crate::spectrum::{
     Config, ConfigError, FrameMark, SampleBuffer, WindowMark, follow_spread, pack_weight, skew_of,
 };
-use crate::timeline::{Curvature, Group, Sample, Spread};
+use crate::timeline::{Curvature, Group, Sample, Spread, Vertical};
 
 /// Collects samples to windows.
 #[derive(Debug)]
@@ -79,7 +79,9 @@ impl<'a> Collector<'a> {
         if let Some(pending) = self.pending.take() {
             self.store(pending);
         }
-        let known = sample.information_per_px2 > 0.0
+        let second = self.second(&sample);
+        let known = (sample.information_per_px2 > 0.0
+            || sample.information_per_px2 == 0.0 && second.is_some())
             && sample.information_per_px2.is_finite()
             && sample.shift_px.is_finite()
             && sample.shift_px.abs() < 1e6
@@ -195,6 +197,16 @@ impl<'a> Collector<'a> {
         (periods > 0 && span > 0 && self.held > 1).then(|| span / periods)
     }
 
+    /// What the sample knows besides, where it is asked for.
+    fn second(&self, sample: &Sample) -> Option<Vertical> {
+        let both = self.ring.channels(usize::from(self.group.slots())) > 1;
+        sample.vertical.filter(|v| {
+            both && v.information_per_px2 > 0.0
+                && v.information_per_px2.is_finite()
+                && v.shift_px.abs() < 1e6
+        })
+    }
+
     fn store(&mut self, sample: Sample) {
         if self.restart {
             self.restart = false;
@@ -222,8 +234,8 @@ impl<'a> Collector<'a> {
                     start_ns,
                 };
             }
-            for slot in 0..slots {
-                if let Some(weight) = self.ring.weight.get_mut(slot * self.capacity + column) {
+            for series in 0..self.ring.channels(slots) * slots {
+                if let Some(weight) = self.ring.weight.get_mut(series * self.capacity + column) {
                     *weight = 0;
                 }
             }
@@ -232,6 +244,7 @@ impl<'a> Collector<'a> {
         self.curvature = sample.curvature;
         let column = self.column(self.held - 1);
         let at = usize::from(sample.slot) * self.capacity + column;
+        let second = self.second(&sample);
         let ring = &mut self.ring;
         if let Some(spread) = ring.spread.get_mut(usize::from(sample.slot)) {
             let first = self.held == 1 || *spread == Spread::default();
@@ -248,6 +261,17 @@ impl<'a> Collector<'a> {
             *x = sample.shift_px;
             *w = pack_weight(sample.information_per_px2);
             *d = skew_of(&self.group, &sample, newest.start_ns);
+        }
+        let Some(vertical) = second else { return };
+        let at = at + slots * self.capacity;
+        if let (Some(y), Some(w), Some(coupling)) = (
+            ring.shift_px.get_mut(at),
+            ring.weight.get_mut(at),
+            ring.couplings.get_mut(usize::from(sample.slot)),
+        ) {
+            *y = vertical.shift_px;
+            *w = pack_weight(vertical.information_per_px2);
+            coupling.follow(&vertical, self.held == 1);
         }
     }
 
@@ -268,7 +292,10 @@ impl<'a> Collector<'a> {
         for slot in 0..self.group.slots() {
             for i in first..self.held {
                 let at = usize::from(slot) * self.capacity + self.column(i);
-                if self.ring.weight.get(at).is_some_and(|&w| w > 0) {
+                let other = at + usize::from(self.group.slots()) * self.capacity;
+                let two = self.ring.channels(usize::from(self.group.slots())) > 1;
+                let knows = |at: usize| self.ring.weight.get(at).is_some_and(|&w| w > 0);
+                if knows(at) || two && knows(other) {
                     lines = lines.saturating_add(u32::from(self.group.rows_of(slot)));
                 }
             }

@@ -24,6 +24,8 @@ const NEAR_MULTIPLE: f32 = 1.2;
 /// Where a tone may be.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Candidate {
+    /// Along x, 0, or along y, 1.
+    pub(crate) axis: usize,
     pub(crate) frequency: Frequency,
     /// About by how much it would lower the weighted sum of squares.
     pub(crate) gain: f32,
@@ -87,19 +89,41 @@ pub(crate) fn candidates(
     let Some(points) = grid.get_mut(..g.points) else {
         return found;
     };
-    for (i, tone) in model.tones.iter().enumerate() {
-        samples.tabulate(i + 1, tone);
+    model.tabulate(samples);
+    for axis in 0..samples.channels {
+        let information = spread(samples, model, points, g, axis);
+        if information > 0.0 {
+            let scale = 2.0 / information;
+            along(
+                samples,
+                points,
+                (g, band),
+                (axis, scale),
+                &barred,
+                &mut found,
+            );
+        }
     }
-    spread(samples, model, points, g);
+    found
+}
+
+/// The same along one axis, of the `points` of the grid; `scale`: what makes a gain of an energy.
+fn along(
+    samples: &Samples<'_>,
+    points: &mut [f32],
+    (g, band): (Grid, Band),
+    (axis, scale): (usize, f32),
+    barred: impl Fn(Candidate) -> bool,
+    found: &mut heapless::Vec<Candidate, CANDIDATES>,
+) {
     let Some(bins) = energies(points) else {
-        return found;
+        return;
     };
     let bin_hz = g.bin_hz();
     let first = 1;
     let last = ((band.highest_hz / bin_hz) as usize).min(bins.len().saturating_sub(2));
-    let scale = 2.0 / samples.total_weight;
     if first > last {
-        return found;
+        return;
     }
     let (mut here, mut after) = (bins[first - 1], bins[first]);
     // No peak lower than this can be a candidate any more: the kernel only falls with frequency, and a parabola's
@@ -144,17 +168,17 @@ pub(crate) fn candidates(
             gain /= kept;
         }
         let candidate = Candidate {
+            axis,
             frequency: Frequency::from_hz(b as f32 * bin_hz).plus(shift * bin_hz),
             gain,
         };
         if !barred(candidate) {
-            insert(&mut found, candidate);
+            insert(found, candidate);
         }
         if found.is_full() {
             too_low = found.last().map_or(0.0, |c| c.gain / most);
         }
     }
-    found
 }
 
 /// Share of a tone's energy left after the projection, from the frames' own times.
@@ -200,16 +224,45 @@ fn parabola(before: f32, here: f32, after: f32) -> (f32, f32) {
     (shift, here - 0.25 * (before - after) * shift)
 }
 
-fn spread(samples: &mut Samples<'_>, model: &Model, points: &mut [f32], g: Grid) {
+/// Spreads the scores along x, or what those along y hold beside them, on the grid; gives their information.
+fn spread(
+    samples: &mut Samples<'_>,
+    model: &Model,
+    points: &mut [f32],
+    g: Grid,
+    axis: usize,
+) -> f32 {
+    let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
+    for series in 0..samples.series() {
+        let sight = samples.sight(series);
+        let (w, x, y) = (
+            samples.series_weight[series],
+            sight.of_drift(0),
+            sight.of_drift(1),
+        );
+        xx += w * x * x;
+        xy += w * x * y;
+        yy += w * y * y;
+    }
+    if xx <= 0.0 && axis == 0 {
+        return 0.0;
+    }
+    let mean = if xx > 0.0 { xy / xx } else { 0.0 };
     points.fill(0.0);
     let scale = samples.length_s / g.step_s;
     let middle = 0.5 * g.points as f32;
     let last = g.points - 2;
-    for slot in 0..samples.slots {
-        if samples.series_weight[slot] <= 0.0 {
+    for series in 0..samples.series() {
+        let sight = samples.sight(series);
+        let share = match axis {
+            0 => sight.of_drift(0),
+            _ => sight.of_drift(1) - mean * sight.of_drift(0),
+        };
+        if samples.series_weight[series] <= 0.0 || share == 0.0 {
             continue;
         }
-        samples.residual(slot, &model.tones, &model.drift);
+        let slot = series % samples.slots;
+        samples.residual(series, &model.tones, &model.drift);
         let t = samples.slot_t[slot];
         for (&x, &frame_t) in samples
             .row
@@ -219,9 +272,11 @@ fn spread(samples: &mut Samples<'_>, model: &Model, points: &mut [f32], g: Grid)
         {
             let at = (frame_t + t) * scale + middle;
             let cell = (at as usize).min(last);
-            let share = (at - cell as f32).clamp(0.0, 1.0);
-            points[cell] += x * (1.0 - share);
-            points[cell + 1] += x * share;
+            let further = (at - cell as f32).clamp(0.0, 1.0);
+            let x = share * x;
+            points[cell] += x * (1.0 - further);
+            points[cell + 1] += x * further;
         }
     }
+    if axis == 0 { xx } else { yy - mean * xy }
 }

@@ -204,7 +204,6 @@ fn view<'s>(
     let (slot_t, rest) = storage.slot_rows.split_at_mut(slots);
     let (series_weight, rest) = rest.split_at_mut(2 * slots);
     let (slot_eta, rest) = rest.split_at_mut(slots);
-    let (coupling, rest) = rest.split_at_mut(slots);
     let (score_re, score_im) = rest.split_at_mut(2 * slots);
     let half = storage.frame_phasors.len() / 2;
     let (frame_re, frame_im) = storage.frame_phasors.split_at_mut(half);
@@ -217,7 +216,7 @@ fn view<'s>(
     let samples = Samples {
         frames,
         slots,
-        channels: 1,
+        channels: storage.samples.channels(slots),
         shift_px: storage.samples.shift_px,
         weight: storage.samples.weight,
         skew: storage.samples.skew,
@@ -228,7 +227,7 @@ fn view<'s>(
         slot_ns: storage.slot_ns,
         slot_t,
         slot_eta,
-        coupling,
+        couplings: storage.samples.couplings,
         series_weight,
         score_re,
         score_im,

@@ -119,9 +119,12 @@ impl Fit {
         samples.count as f32 - (offsets + drift + fitted + notches) as f32
     }
 
-    /// How much of the residual of the last pass is at tone `i` (squared).
-    pub(crate) fn held(&self, i: usize) -> f32 {
-        self.moments.get(i).map_or(0.0, |m| m[0][0].norm_sqr())
+    /// How much of the residual of the last pass is at tone `i`, the same in all rows along `axis` (squared).
+    pub(crate) fn held(&self, i: usize, axis: usize) -> f32 {
+        let constant = CONSTANTS[axis.min(1)];
+        self.moments
+            .get(i)
+            .map_or(0.0, |m| m[constant][0].norm_sqr())
     }
 
     /// The residual of `model` and its moments.
@@ -289,19 +292,6 @@ fn axis_of(regressor: &Regressor) -> usize {
 
 /// What an amplitude's change is in the changes of the coefficients.
 pub(crate) type Direction = [Complex; BASIS];
-
-/// Along the constant of a tone's motion along x.
-pub(crate) fn along_constant(tone: &Tone) -> Direction {
-    let mut direction = [Complex::new(0.0, 0.0); BASIS];
-    let c = tone.shape.coefficient(0);
-    let size = c.norm_sqr();
-    direction[0] = if size > 0.0 {
-        c.unscale(crate::math::sqrtf(size))
-    } else {
-        Complex::new(1.0, 0.0)
-    };
-    direction
-}
 
 /// How many powers of t the drift has: fewer where there are few frames.
 pub(crate) fn drift_powers(samples: &Samples<'_>) -> usize {

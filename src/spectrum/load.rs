@@ -39,18 +39,28 @@ impl Loaded {
     ) -> Self {
         let slots = usize::from(group.slots());
         let to = &mut storage.samples;
-        for slot in 0..slots {
+        let channels = to.channels(slots);
+        let known = from.channels(slots) * slots;
+        for series in 0..channels * slots {
             for i in 0..frames {
-                let (a, b) = (slot * stride + column(i), slot * frames + i);
-                to.shift_px[b] = from.shift_px.get(a).copied().unwrap_or(0.0);
-                to.weight[b] = from.weight.get(a).copied().unwrap_or(0);
-                to.skew[b] = from.skew.get(a).copied().unwrap_or(0);
-                if to.weight[b] == 0 {
-                    to.shift_px[b] = 0.0;
-                    to.skew[b] = 0;
+                let (a, b) = (series * stride + column(i), series * frames + i);
+                let there = series < known;
+                let weight = from.weight.get(a).filter(|_| there).copied().unwrap_or(0);
+                to.weight[b] = weight;
+                to.shift_px[b] = match from.shift_px.get(a) {
+                    Some(x) if weight > 0 => *x,
+                    _ => 0.0,
+                };
+                if series < slots {
+                    to.skew[b] = from.skew.get(a).copied().unwrap_or(0);
                 }
             }
+        }
+        for slot in 0..slots {
             to.spread[slot] = from.spread.get(slot).copied().unwrap_or_default();
+            if let Some(coupling) = to.couplings.get_mut(slot) {
+                *coupling = from.couplings.get(slot).copied().unwrap_or_default();
+            }
         }
         for i in 0..frames {
             to.frames[i] = from.frames.get(column(i)).copied().unwrap_or_default();
@@ -59,7 +69,7 @@ impl Loaded {
             frames,
             ..Self::default()
         };
-        loaded.normalise(&mut storage.samples.weight[..frames * slots]);
+        loaded.normalise(&mut storage.samples.weight[..channels * frames * slots]);
         loaded.place(storage, group, slots);
         loaded.rate(&storage.samples.frames[..frames]);
         loaded
@@ -93,15 +103,27 @@ impl Loaded {
         frame_weight.fill(0.0);
         let unit = skew_unit_ns(group);
         let (mut late, mut total) = (0.0_f32, 0.0_f32);
+        let two = s.samples.channels(slots) > 1;
         for slot in 0..slots {
-            let (mut sum, mut skew_sum) = (0.0, 0.0);
+            let (mut sum, mut skew_sum, mut second) = (0.0, 0.0, 0.0);
             for i in 0..frames {
-                let w = unpack_weight(s.samples.weight[slot * frames + i]);
+                let at = slot * frames + i;
+                let first = unpack_weight(s.samples.weight[at]);
+                let other = if two {
+                    unpack_weight(s.samples.weight[at + slots * frames])
+                } else {
+                    0.0
+                };
+                let w = first + other;
                 sum += w;
-                skew_sum += w * f32::from(s.samples.skew[slot * frames + i]);
+                second += other;
+                skew_sum += w * f32::from(s.samples.skew[at]);
                 frame_weight[i] += w;
+                if w <= 0.0 {
+                    s.samples.skew[at] = 0;
+                }
             }
-            slot_weight[slot] = sum;
+            (slot_weight[slot], slot_weight[slots + slot]) = (sum - second, second);
             let skew = if sum > 0.0 {
                 libm::roundf(skew_sum / sum) as i16
             } else {
@@ -110,7 +132,8 @@ impl Loaded {
             // The slot's usual skew goes into its own time; only what differs from frame to frame stays.
             for i in 0..frames {
                 let at = slot * frames + i;
-                if s.samples.weight[at] > 0 {
+                let second = two && s.samples.weight[at + slots * frames] > 0;
+                if s.samples.weight[at] > 0 || second {
                     let left = s.samples.skew[at].saturating_sub(skew);
                     s.samples.skew[at] = left;
                     self.skewed |= left.unsigned_abs() > NO_SKEW;
@@ -120,7 +143,8 @@ impl Loaded {
             late += sum * s.slot_ns[slot] as f32;
             total += sum;
         }
-        spread_over_rows(slot_eta, &slot_weight[..slots], group);
+        let knows = |slot: usize| slot_weight[slot] + slot_weight[slots + slot];
+        spread_over_rows(slot_eta, knows, total, group);
         let middle = if total > 0.0 {
             (late / total) as i64
         } else {
@@ -177,15 +201,12 @@ impl Loaded {
 const KNOWS: f32 = 0.02;
 
 /// Where the slots' middles are from the first row that knows something, −1, to the last, 1.
-fn spread_over_rows(eta: &mut [f32], weight: &[f32], group: &Group) {
+fn spread_over_rows(eta: &mut [f32], weight: impl Fn(usize) -> f32, total: f32, group: &Group) {
     let slots = eta.len();
-    let mean = weight.iter().sum::<f32>() / slots.max(1) as f32;
-    let knows = |w: &f32| *w > KNOWS * mean;
-    let first = weight.iter().position(knows).unwrap_or(0);
-    let last = weight
-        .iter()
-        .rposition(knows)
-        .unwrap_or(slots.saturating_sub(1));
+    let mean = total / slots.max(1) as f32;
+    let knows = |slot: &usize| weight(*slot) > KNOWS * mean;
+    let first = (0..slots).find(knows).unwrap_or(0);
+    let last = (0..slots).rfind(knows).unwrap_or(slots.saturating_sub(1));
     let rows = f32::from(group.rows_per_sample());
     let begin = first as f32 * rows;
     let end = last as f32 * rows + f32::from(group.rows_of(last as u16));

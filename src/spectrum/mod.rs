@@ -49,6 +49,6 @@ pub use follow::{Follower, name_harmonics};
 pub use plan::{FrameRatePlan, PlanError};
 pub use storage::{EstimatorStorage, StaticStorage, Storage};
 pub use tones::Tones;
-pub use window::{FrameMark, SampleBuffer, WindowMark};
+pub use window::{FrameMark, SampleBuffer, SlotCoupling, WindowMark};
 
 pub(crate) use window::{follow_spread, pack_weight, skew_of};

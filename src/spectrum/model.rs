@@ -11,6 +11,7 @@ use super::phase::Frequency;
 use super::rows;
 use super::shape::{BASIS, Coupling, Sight, legendre};
 use super::tone::Tone;
+use super::window::SlotCoupling;
 use crate::math::{cos_sin, turns};
 use crate::report::MAX_PEAKS;
 use crate::timeline::Spread;
@@ -23,6 +24,9 @@ pub(crate) const POWERS: usize = 3;
 
 /// A sample is skewed where its time is off its frame's and slot's by more than this many steps.
 pub(crate) const NO_SKEW: u16 = 16;
+
+/// No more is believed of what a slot's second measurement has of the speed along x: a tenth of a second.
+const MOST_DELAY_NS: f32 = 1e8;
 
 /// Weighted inner products of the residual with t^p·e^(iωt) times each of the shape's polynomials, p from 0.
 pub(crate) type Moments = [[Complex; POWERS]; BASIS];
@@ -56,8 +60,8 @@ pub(crate) struct Samples<'a> {
     pub(crate) slot_t: &'a mut [f32],
     /// Where a slot is among the rows that know something, −1 to 1.
     pub(crate) slot_eta: &'a [f32],
-    /// How much of a motion along y is in the first channel of a slot.
-    pub(crate) coupling: &'a [f32],
+    /// How the two series of a slot see both axes.
+    pub(crate) couplings: &'a [SlotCoupling],
     /// Sum of weights of each series.
     pub(crate) series_weight: &'a mut [f32],
     /// How a slot's rows lie in time.
@@ -121,18 +125,21 @@ impl Samples<'_> {
     pub(crate) fn sight(&self, series: usize) -> Sight {
         let slot = series % self.slots.max(1);
         let axes = (self.channels > 1).then(|| {
-            let whole = Coupling {
-                of_motion: 1.0,
-                of_speed_s: 0.0,
+            let of = self.couplings.get(slot).copied().unwrap_or_default();
+            let coupling = |of_motion: f32, of_speed_ns: f32| Coupling {
+                of_motion,
+                of_speed_s: 1e-9 * of_speed_ns,
             };
             if series < self.slots {
-                let share = Coupling {
-                    of_motion: self.coupling[slot],
-                    of_speed_s: 0.0,
-                };
-                [whole, share]
+                [
+                    coupling(1.0, 0.0),
+                    coupling(of.coupling, of.coupling_delay_ns),
+                ]
             } else {
-                [Coupling::default(), whole]
+                // What is added up is weighted by the information, of which the first measurement has so much more.
+                let more = self.series_weight[slot] / self.series_weight[series].max(1e-20);
+                let cross_ns = (more * of.coupling_delay_ns).clamp(-MOST_DELAY_NS, MOST_DELAY_NS);
+                [coupling(0.0, cross_ns), coupling(1.0, of.delay_ns)]
             }
         });
         Sight {

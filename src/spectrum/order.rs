@@ -16,8 +16,8 @@ const SELDOM: f32 = 2.33;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Grown {
     pub(crate) fit: ShapeFit,
-    /// The gain of the rigid one.
-    pub(crate) rigid_gain: f32,
+    /// The same in all rows, along the same axes.
+    pub(crate) rigid: ShapeFit,
     /// Chi² for each degree of freedom of what is left at the alias frequency, over what noise leaves; and how many there are.
     pub(crate) residual: Residue,
 }
@@ -94,16 +94,41 @@ impl Samples<'_> {
         }
     }
 
+    /// The shape at `at` that the scores ask for, along those axes that move: an axis without which the others do as well
+    /// counts as still.
+    pub(crate) fn grow(&self, scores: &Scores, at: Frequency, variance: f32) -> Grown {
+        let along = |axes| self.grow_along(scores, at, axes, variance);
+        let x = along([true, false]);
+        if self.channels < 2 {
+            return x;
+        }
+        let (y, both) = (along([false, true]), along([true, true]));
+        let needs = |one: &Grown| {
+            let numbers = |g: &Grown| 2.0 * g.fit.shape.count() as f32;
+            let d1 = (numbers(&both) - numbers(one)).max(2.0);
+            let gained = (both.fit.gain - one.fit.gain) / (d1 * variance);
+            let f = gained / both.residual.each().max(1.0);
+            is_rare(f, d1, both.residual.freedom)
+        };
+        let mut best = match (needs(&y), needs(&x)) {
+            (true, true) => return both,
+            (true, false) => x,
+            (false, true) => y,
+            (false, false) if x.fit.gain >= y.fit.gain => x,
+            (false, false) => y,
+        };
+        let count = |g: &Grown| 2.0 * g.fit.shape.count() as f32;
+        best.residual = Residue {
+            chi2: both.residual.chi2 + (both.fit.gain - best.fit.gain) / variance,
+            freedom: both.residual.freedom + count(&both) - count(&best),
+        };
+        best
+    }
+
     /// The shape at `at` that the scores ask for: its order grows from 0 while the gain is more than what the higher order
     /// still leaves (never against the noise alone: then orders would grow on whatever the model lacks), looking two
     /// orders ahead. `axes`: those that move. `variance`: the noise's.
-    pub(crate) fn grow(
-        &self,
-        scores: &Scores,
-        at: Frequency,
-        axes: [bool; 2],
-        variance: f32,
-    ) -> Grown {
+    fn grow_along(&self, scores: &Scores, at: Frequency, axes: [bool; 2], variance: f32) -> Grown {
         let all = self.knowing();
         let most = all.len().saturating_sub(1) / 2;
         let (free, numbers) = self.free_gain(scores, at, axes);
@@ -141,7 +166,7 @@ impl Samples<'_> {
         }
         Grown {
             fit: best,
-            rigid_gain: rigid.gain,
+            rigid,
             residual: residue(best.gain, order),
         }
     }

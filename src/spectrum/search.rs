@@ -2,7 +2,8 @@
 
 use super::alarm;
 use super::detect::{self, Band, Candidate};
-use super::fit::{Fit, Model, along_constant, drift_powers};
+use super::fit::{Fit, Model, drift_powers};
+use super::largest::{direction, largest};
 use super::model::Samples;
 use super::phase::Frequency;
 use super::tone::Tone;
@@ -53,6 +54,9 @@ const CHIRPS: [f32; 7] = [
     MOST_CHIRP,
     -MOST_CHIRP,
 ];
+
+/// Where samples know both axes: how much of the false alarms is for tones along x, so that next to nothing is lost of those.
+const ALONG_X: f32 = 0.9;
 
 /// Places at which nothing could be put that are remembered.
 const MOST_BARRED: usize = 8;
@@ -149,11 +153,16 @@ impl Search {
         fit.passes.saturating_add(STEPS) > self.most_passes
     }
 
-    /// Share by which a tone must lower the sum of squares.
-    fn threshold(&self, samples: &Samples<'_>, model: &Model) -> f32 {
+    /// Share by which a tone along `axis` must lower the sum of squares.
+    fn threshold(&self, samples: &Samples<'_>, model: &Model, axis: usize) -> f32 {
         // T_e = √(4π·var t) = 1.023 T for samples spread evenly.
         let widths = (self.band.highest_hz - self.band.lowest_hz) * samples.length_s * 1.023;
-        alarm::threshold(self.false_alarm, widths, Fit::freedom(samples, model) - 3.0)
+        let alarms = match (samples.channels, axis) {
+            (1, _) => self.false_alarm,
+            (_, 0) => ALONG_X * self.false_alarm,
+            _ => (1.0 - ALONG_X) * self.false_alarm,
+        };
+        alarm::threshold(alarms, widths, Fit::freedom(samples, model) - 3.0)
     }
 
     fn add(
@@ -167,7 +176,6 @@ impl Search {
         if Fit::freedom(samples, model) < 6.0 {
             return false;
         }
-        let share = self.threshold(samples, model);
         let length_s = samples.length_s;
         let mut barred = Barred {
             places: heapless::Vec::new(),
@@ -181,6 +189,7 @@ impl Search {
             let Some(first) = candidates.first().copied() else {
                 return false;
             };
+            let share = self.threshold(samples, model, first.axis);
             if first.gain < 0.4 * share * model.squares {
                 return false;
             }
@@ -242,11 +251,13 @@ impl Search {
                 continue;
             }
             let mut put = false;
-            for start in self.starts(samples, candidate.frequency) {
+            let starts = self.starts(samples, candidate.frequency);
+            for at in starts {
                 if self.tired(fit) {
                     return found;
                 }
                 let mut trial = model.clone();
+                let start = Tone::steady(at, candidate.axis);
                 if self.put(samples, fit, &mut trial, start) {
                     put = true;
                     if !found || trial.squares < best.squares {
@@ -323,9 +334,9 @@ impl Search {
         samples: &mut Samples<'_>,
         fit: &mut Fit,
         model: &mut Model,
-        start: Frequency,
+        start: Tone,
     ) -> bool {
-        if model.tones.push(Tone::steady(start)).is_err() {
+        if model.tones.push(start).is_err() {
             return false;
         }
         fit.refine(samples, model, STEPS);
@@ -370,10 +381,12 @@ impl Search {
                 Some(tone) if tone.frozen => break,
                 Some(tone) if !tone.modulated && chirp == 0.0 => tone.modulated = true,
                 Some(tone) if !tone.modulated => {
+                    tone.shape.clear();
                     *tone = Tone {
                         modulated: true,
                         chirp,
-                        ..Tone::steady(center)
+                        shape: tone.shape,
+                        ..Tone::steady(center, 0)
                     };
                 }
                 _ => break,
@@ -425,21 +438,23 @@ impl Search {
         }
         let mut changed = false;
         for i in 0..model.tones.len() {
-            if self.tired(fit)
-                || model
-                    .tones
-                    .get(i)
-                    .is_none_or(|t| t.modulated || t.frozen || t.shape.count() > 1)
-            {
+            let free = |t: &&Tone| !t.modulated && !t.frozen;
+            let tone = model.tones.get(i).filter(free);
+            let (Some(axis), false) = (tone.and_then(|t| t.shape.rigid_axis()), self.tired(fit))
+            else {
                 continue;
-            }
+            };
             let ghosts = self.ghosts(samples, fit, model, i, fps);
             let mut without = model.clone();
             without.tones.swap_remove(i);
             for candidate in &ghosts {
                 let mut trial = without.clone();
-                if self.put(samples, fit, &mut trial, candidate.frequency)
-                    && trial.squares < 0.9999 * model.squares
+                if self.put(
+                    samples,
+                    fit,
+                    &mut trial,
+                    Tone::steady(candidate.frequency, axis),
+                ) && trial.squares < 0.9999 * model.squares
                 {
                     *model = trial;
                     changed = true;
@@ -465,6 +480,7 @@ impl Search {
             return ghosts;
         };
         let own = tone.frequency;
+        let axis = tone.shape.rigid_axis().unwrap_or(0);
         tone.shape.clear();
         tone.modulated = false;
         let first = probes.tones.len();
@@ -477,8 +493,9 @@ impl Search {
                 .iter()
                 .all(|t| t.frequency.above(frequency).abs() * samples.length_s > CLOSEST);
             if within && free && first + ghosts.len() < samples.most_tones() {
-                let _ = probes.tones.push(Tone::steady(frequency));
+                let _ = probes.tones.push(Tone::steady(frequency, axis));
                 let _ = ghosts.push(Candidate {
+                    axis,
                     frequency,
                     gain: 0.0,
                 });
@@ -488,9 +505,9 @@ impl Search {
             return ghosts;
         }
         fit.evaluate(samples, &mut probes);
-        let here = fit.held(i);
+        let here = fit.held(i, axis);
         for (j, ghost) in ghosts.iter_mut().enumerate() {
-            ghost.gain = fit.held(first + j);
+            ghost.gain = fit.held(first + j, axis);
         }
         ghosts.retain(|g| g.gain > 0.5 * here);
         ghosts
@@ -498,20 +515,22 @@ impl Search {
 
     /// Drops tones that no longer lower the sum of squares enough beside the others.
     fn drop_weak(&self, samples: &mut Samples<'_>, fit: &mut Fit, model: &mut Model) -> bool {
-        let share = self.threshold(samples, model);
         let regressors = fit.weigh(samples, model);
-        let mut weakest: Option<(usize, f32)> = None;
+        let mut weakest: Option<(usize, f32, f32)> = None;
         for (i, tone) in model.tones.iter().enumerate().filter(|(_, t)| !t.frozen) {
-            let sd = fit
-                .deviation(&regressors, i, samples.length_s, &along_constant(tone))
-                .amplitude_px;
-            let gain = tone.shape.power() / (sd * sd);
-            if weakest.is_none_or(|(_, g)| gain < g) {
-                weakest = Some((i, gain));
+            let (eta, orbit) = largest(&tone.shape);
+            let along = direction(eta, &orbit);
+            let unit = fit.deviation(&regressors, i, samples.length_s, &along);
+            let over = orbit.semi_major_px / unit.amplitude_px;
+            let gain = over * over;
+            let axis = usize::from(tone.shape.orders()[0] == 0);
+            let share = self.threshold(samples, model, axis);
+            if weakest.is_none_or(|(_, g, least)| gain * least < g * share) {
+                weakest = Some((i, gain, share));
             }
         }
         match weakest {
-            Some((i, gain)) if gain < 0.7 * share * model.squares => {
+            Some((i, gain, share)) if gain < 0.7 * share * model.squares => {
                 model.tones.remove(i);
                 fit.refine(samples, model, STEPS);
                 true

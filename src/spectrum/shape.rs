@@ -86,10 +86,31 @@ pub(crate) struct Shape {
 
 impl Shape {
     /// The same in all rows, along x; no amplitude yet.
-    pub(crate) const RIGID: Self = Self {
+    const RIGID: Self = Self {
         coefficients: [ZERO; BASIS],
         orders: [1, 0],
     };
+
+    /// The same in all rows, along x, 0, or y, 1; no amplitude yet.
+    pub(crate) const fn along(axis: usize) -> Self {
+        if axis == 0 {
+            Self::RIGID
+        } else {
+            Self {
+                coefficients: [ZERO; BASIS],
+                orders: [0, 1],
+            }
+        }
+    }
+
+    /// The axis of a shape that is the same in all rows and along one axis.
+    pub(crate) fn rigid_axis(&self) -> Option<usize> {
+        match self.orders {
+            [1, 0] => Some(0),
+            [0, 1] => Some(1),
+            _ => None,
+        }
+    }
 
     /// Fitted coefficients along either axis, no more than there are; without amplitude.
     pub(crate) fn of_orders(x: usize, y: usize) -> Self {

@@ -72,11 +72,9 @@ impl Search {
         let scores = samples.score(model, i, |j| j == i);
         fit.passes = fit.passes.saturating_add(1);
         let axes = [true, samples.channels > 1];
-        let here = samples.grow(&scores, tone.frequency, axes, variance);
+        let here = samples.grow(&scores, tone.frequency, variance);
         // At an image nothing low fits, and growth has to beat what is left: that alone would not tell.
-        if !here.residual.is_more_than_noise()
-            && here.fit.shape.orders().map(|o| o.max(1)) == tone.shape.orders().map(|o| o.max(1))
-        {
+        if !here.residual.is_more_than_noise() && here.fit.shape.orders() == tone.shape.orders() {
             return false;
         }
         let all = samples.knowing();
@@ -94,10 +92,14 @@ impl Search {
             }
         }
         let Some(best) = best else { return false };
-        let grown = samples.grow(&scores, best.at, axes, variance);
-        if !stands(&grown, variance)
-            || grown.fit.shape.orders() == tone.shape.orders() && best.at == tone.frequency
-        {
+        let grown = samples.grow(&scores, best.at, variance);
+        let (at, shape) = if stands(&grown, variance) {
+            (best.at, grown.fit.shape)
+        } else {
+            // It travels, or two tones are there: still it may be along both axes.
+            (tone.frequency, here.rigid.shape)
+        };
+        if shape.orders() == tone.shape.orders() && at == tone.frequency {
             return false;
         }
         let unsure = second.is_some_and(|s| {
@@ -105,11 +107,11 @@ impl Search {
         });
         let mut trial = model.clone();
         if let Some(tone) = trial.tones.get_mut(i) {
-            tone.shape = grown.fit.shape;
-            tone.frequency = best.at;
+            tone.shape = shape;
+            tone.frequency = at;
             tone.unsure = unsure;
-            if best.at.hz() < 0.0 {
-                tone.frequency = best.at.mirrored();
+            if at.hz() < 0.0 {
+                tone.frequency = at.mirrored();
                 tone.shape = tone.shape.conjugate();
             }
         }
@@ -225,7 +227,7 @@ impl Search {
 
 /// The shape is real but for one phase along either axis, as far as noise lets it tell.
 fn stands(grown: &Grown, variance: f32) -> bool {
-    let bent = grown.fit.gain - grown.rigid_gain;
+    let bent = grown.fit.gain - grown.rigid.gain;
     let limit = TRAVELS * bent;
     grown.fit.loss < limit.max(LOSS_BY_NOISE * variance * grown.residual.each().max(1.0))
 }

@@ -1,6 +1,6 @@
 //! The memory that the collecting and the computing side work in, lent by the caller.
 
-use super::window::{FrameMark, SampleBuffer};
+use super::window::{FrameMark, SampleBuffer, SlotCoupling};
 use crate::timeline::Spread;
 
 /// Rows of [`EstimatorStorage::frame_rows`]: time, weight and four of scratch.
@@ -13,9 +13,8 @@ pub(crate) const MAX_GRID: usize = if cfg!(feature = "grid-32768") {
     8192
 };
 
-/// Rows of [`EstimatorStorage::slot_rows`]: time, two weights, place among the rows, coupling of the axes, and four of
-/// scratch.
-pub(crate) const SLOT_ROWS: usize = 9;
+/// Rows of [`EstimatorStorage::slot_rows`]: time, two weights, place among the rows, and four of scratch.
+pub(crate) const SLOT_ROWS: usize = 8;
 
 /// What [`super::Estimator`] works in. F: frames a window, S: slots a frame.
 #[derive(Debug)]
@@ -28,7 +27,7 @@ pub struct EstimatorStorage<'a> {
     pub slot_ns: &'a mut [i64],
     /// 6·F.
     pub frame_rows: &'a mut [f32],
-    /// 9·S.
+    /// 8·S.
     pub slot_rows: &'a mut [f32],
     /// Phasors of tones at frames: 2·F·(tones + 1).
     pub frame_phasors: &'a mut [f32],
@@ -72,6 +71,7 @@ pub struct StaticStorage<
     weight: [[u16; SAMPLES]; 2],
     skew: [[i16; SAMPLES]; 2],
     spread: [[Spread; SLOTS]; 2],
+    couplings: [[SlotCoupling; SLOTS]; 2],
     frames: [[FrameMark; FRAMES]; 2],
     frame_ns: [i64; FRAMES],
     slot_ns: [i64; SLOTS],
@@ -100,6 +100,11 @@ impl<
                 variance_ns2: 0.0,
                 third_ns3: 0.0,
             }; SLOTS]; 2],
+            couplings: [[SlotCoupling {
+                coupling: 0.0,
+                coupling_delay_ns: 0.0,
+                delay_ns: 0.0,
+            }; SLOTS]; 2],
             frames: [[FrameMark {
                 number: 0,
                 start_ns: 0,
@@ -114,12 +119,22 @@ impl<
         }
     }
 
-    /// Lends all of it.
+    /// Lends all of it, for samples that know the motion along x alone.
     pub const fn lend(&mut self) -> Storage<'_> {
+        let mut storage = self.lend_both();
+        storage.collected.couplings = &mut [];
+        storage.estimator.samples.couplings = &mut [];
+        storage
+    }
+
+    /// Lends all of it, for samples that know the motion along both axes: each takes two of the shifts, so that there is
+    /// room for half as many frames.
+    pub const fn lend_both(&mut self) -> Storage<'_> {
         let [shift_a, shift_b] = &mut self.shift_px;
         let [weight_a, weight_b] = &mut self.weight;
         let [skew_a, skew_b] = &mut self.skew;
         let [spread_a, spread_b] = &mut self.spread;
+        let [couplings_a, couplings_b] = &mut self.couplings;
         let [frames_a, frames_b] = &mut self.frames;
         Storage {
             collected: SampleBuffer {
@@ -127,6 +142,7 @@ impl<
                 weight: weight_a,
                 skew: skew_a,
                 spread: spread_a,
+                couplings: couplings_a,
                 frames: frames_a,
             },
             estimator: EstimatorStorage {
@@ -135,6 +151,7 @@ impl<
                     weight: weight_b,
                     skew: skew_b,
                     spread: spread_b,
+                    couplings: couplings_b,
                     frames: frames_b,
                 },
                 frame_ns: &mut self.frame_ns,

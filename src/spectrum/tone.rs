@@ -27,10 +27,11 @@ pub(crate) struct Tone {
 }
 
 impl Tone {
-    pub(crate) fn steady(frequency: Frequency) -> Self {
+    /// The same in all rows and at all times, along x, 0, or y, 1; without amplitude.
+    pub(crate) fn steady(frequency: Frequency, axis: usize) -> Self {
         Self {
             frequency,
-            shape: Shape::RIGID,
+            shape: Shape::along(axis),
             chirp: 0.0,
             growth: 0.0,
             unsure: false,

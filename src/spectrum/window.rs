@@ -6,22 +6,60 @@
 //! differently from frame to frame) is its skew, kept in small steps and applied to first order.
 
 use crate::math::since;
-use crate::timeline::{Curvature, Group, Sample, Spread};
+use crate::timeline::{Curvature, Group, Sample, Spread, Vertical};
 
-/// Samples as they are collected: shift, weight and skew, 8 bytes a sample.
+/// Samples as they are collected: shift, weight and skew, 8 bytes a sample, and 6 more where they know both axes.
 #[derive(Debug)]
 pub struct SampleBuffer<'a> {
-    /// Shifts, px.
+    /// Shifts, px; twice as many where they know both axes, those along y behind the others.
     pub shift_px: &'a mut [f32],
-    /// Weights, the upper half of an `f32`'s bits; 0 where there is no sample.
+    /// Weights, the upper half of an `f32`'s bits; 0 where there is no sample. As many as there are shifts.
     pub weight: &'a mut [u16],
     /// Time beyond that of frame and slot, in steps of the skew unit.
     pub skew: &'a mut [i16],
     /// How the rows of each slot lie in time, one a slot.
     pub spread: &'a mut [Spread],
+    /// What of a motion along y each slot takes for one along x, one a slot; empty where the samples know x alone.
+    pub couplings: &'a mut [SlotCoupling],
     /// The frames.
     pub frames: &'a mut [FrameMark],
 }
+
+/// How the two measurements of a slot's samples see a motion (x, y): constants of its rows' texture, as
+/// [`crate::timeline::Vertical`] has them.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SlotCoupling {
+    /// κ: the first one is x + κ·y. No unit.
+    pub coupling: f32,
+    /// And so much of the speed along y, ns.
+    pub coupling_delay_ns: f32,
+    /// The second one is y and so much of its speed, ns.
+    pub delay_ns: f32,
+}
+
+impl SlotCoupling {
+    /// That of one sample; what is no number is 0.
+    fn of(vertical: &Vertical) -> Self {
+        let known = |v: f32| if v.abs() < MOST_COUPLING { v } else { 0.0 };
+        Self {
+            coupling: known(vertical.coupling),
+            coupling_delay_ns: known(vertical.coupling_delay_ns),
+            delay_ns: known(vertical.delay_ns),
+        }
+    }
+
+    /// After one more sample.
+    pub(crate) fn follow(&mut self, vertical: &Vertical, first: bool) {
+        let now = Self::of(vertical);
+        let share = if first { 1.0 } else { FOLLOW };
+        self.coupling += share * (now.coupling - self.coupling);
+        self.coupling_delay_ns += share * (now.coupling_delay_ns - self.coupling_delay_ns);
+        self.delay_ns += share * (now.delay_ns - self.delay_ns);
+    }
+}
+
+/// Couplings and delays (ns) beyond this are nonsense.
+const MOST_COUPLING: f32 = 1e9;
 
 /// One frame of a [`SampleBuffer`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -35,15 +73,23 @@ pub struct FrameMark {
 impl SampleBuffer<'_> {
     /// How many frames of `slots` samples fit.
     pub(crate) fn frame_capacity(&self, slots: usize) -> usize {
-        let samples = self
-            .shift_px
-            .len()
-            .min(self.weight.len())
-            .min(self.skew.len());
+        let series = self.channels(slots) * slots.max(1);
+        let samples = self.shift_px.len().min(self.weight.len()) / series;
         if self.spread.len() < slots {
             return 0;
         }
-        (samples / slots.max(1)).min(self.frames.len())
+        samples
+            .min(self.skew.len() / slots.max(1))
+            .min(self.frames.len())
+    }
+
+    /// 2 where there is room for both axes, else 1.
+    pub(crate) fn channels(&self, slots: usize) -> usize {
+        if slots > 0 && self.couplings.len() >= slots {
+            2
+        } else {
+            1
+        }
     }
 }
 

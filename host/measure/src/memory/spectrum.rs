@@ -1,7 +1,7 @@
 //! The spectrum's memory.
 
 use rowtone::report::MAX_PEAKS;
-use rowtone::spectrum::{EstimatorStorage, FrameMark, SampleBuffer, Storage};
+use rowtone::spectrum::{EstimatorStorage, FrameMark, SampleBuffer, SlotCoupling, Storage};
 use rowtone::timeline::{Group, Spread};
 
 /// Longest transform, points: that of the core.
@@ -35,16 +35,18 @@ struct Buffer {
     weight: Vec<u16>,
     skew: Vec<i16>,
     spread: Vec<Spread>,
+    couplings: Vec<SlotCoupling>,
     frames: Vec<FrameMark>,
 }
 
 impl Buffer {
-    fn new(frames: usize, slots: usize) -> Self {
+    fn new(frames: usize, slots: usize, axes: usize) -> Self {
         Self {
-            shift_px: vec![0.0; frames * slots],
-            weight: vec![0; frames * slots],
+            shift_px: vec![0.0; axes * frames * slots],
+            weight: vec![0; axes * frames * slots],
             skew: vec![0; frames * slots],
             spread: vec![Spread::default(); slots],
+            couplings: vec![SlotCoupling::default(); (axes - 1) * slots],
             frames: vec![FrameMark::default(); frames],
         }
     }
@@ -55,6 +57,7 @@ impl Buffer {
             weight: &mut self.weight,
             skew: &mut self.skew,
             spread: &mut self.spread,
+            couplings: &mut self.couplings,
             frames: &mut self.frames,
         }
     }
@@ -62,16 +65,26 @@ impl Buffer {
 
 impl SpectrumMemory {
     /// Room for windows of `window_s` seconds at up to `fps` frames a second (and a quarter more, and two frames).
+    /// The samples know the motion along x alone.
     pub fn new(group: Group, window_s: f64, fps: f64) -> Self {
+        Self::along(1, group, window_s, fps)
+    }
+
+    /// The same for samples that know the motion along both axes.
+    pub fn along_both(group: Group, window_s: f64, fps: f64) -> Self {
+        Self::along(2, group, window_s, fps)
+    }
+
+    fn along(axes: usize, group: Group, window_s: f64, fps: f64) -> Self {
         let frames = (window_s * fps * 1.25).clamp(4.0, 65_000.0) as usize + 2;
         let slots = usize::from(group.slots());
         let rows = MAX_PEAKS + 1;
         Self {
-            buffers: [Buffer::new(frames, slots), Buffer::new(frames, slots)],
+            buffers: [0, 1].map(|_| Buffer::new(frames, slots, axes)),
             frame_ns: vec![0; frames],
             slot_ns: vec![0; slots],
             frame_rows: vec![0.0; 6 * frames],
-            slot_rows: vec![0.0; 9 * slots],
+            slot_rows: vec![0.0; 8 * slots],
             frame_phasors: vec![0.0; 2 * rows * frames],
             slot_phasors: vec![0.0; 2 * rows * slots],
             grid: vec![0.0; GRID],
