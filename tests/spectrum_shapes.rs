@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use rowtone::camera::Timing;
 use rowtone::pipeline::Analyzer;
-use rowtone::report::{Peak, Report};
+use rowtone::report::{Peak, PeakShape, Report};
 use rowtone::spectrum::{Config, StaticStorage};
 use rowtone::timeline::{Group, Sample, Vertical, rows_per_sample};
 
@@ -33,6 +33,11 @@ const NOISE_PX: f64 = 0.003;
 /// One second of a camera of 144 rows, 90 µs apart, that sees `motion` (px at s and η, −1 in the first row and 1 in the last),
 /// its slots off by 0.1 px and noisy by 0.003 px.
 fn report(seed: u64, motion: impl Fn(f64, f64) -> f64) -> Report {
+    analysis(seed, motion).0
+}
+
+/// The same with the shapes of the peaks.
+fn analysis(seed: u64, motion: impl Fn(f64, f64) -> f64) -> (Report, Vec<PeakShape>) {
     let timing = Timing::new(90_000_000, 0, 144).unwrap();
     let group = Group::new(timing, rows_per_sample(timing, 1000.0, 60, 1 << 16)).unwrap();
     let mut noise = Noise(seed);
@@ -61,7 +66,8 @@ fn report(seed: u64, motion: impl Fn(f64, f64) -> f64) -> Report {
             assert!(!done);
         }
     }
-    analyzer.finish().unwrap()
+    let report = analyzer.finish().unwrap();
+    (report, analyzer.shapes().to_vec())
 }
 
 /// The one peak that is neither doubtful nor below `least_px`.
@@ -126,6 +132,15 @@ struct Slot {
 
 /// The same camera where samples know both axes; `motion` gives x and y, px.
 fn planar(seed: u64, motion: impl Fn(f64, f64) -> [f64; 2]) -> Report {
+    textured(seed, None, motion)
+}
+
+/// The same where all rows lean alike: κ is this, and the second measurement knows next to nothing.
+fn leaning(seed: u64, coupling: f64, motion: impl Fn(f64) -> [f64; 2]) -> Report {
+    textured(seed, Some(coupling), |t, _| motion(t))
+}
+
+fn textured(seed: u64, lean: Option<f64>, motion: impl Fn(f64, f64) -> [f64; 2]) -> Report {
     let timing = Timing::new(90_000_000, 0, 144).unwrap();
     let group = Group::new(timing, rows_per_sample(timing, 1000.0, 60, 1 << 16)).unwrap();
     let mut noise = Noise(seed);
@@ -134,8 +149,9 @@ fn planar(seed: u64, motion: impl Fn(f64, f64) -> [f64; 2]) -> Report {
     }
     let slots: Vec<Slot> = (0..group.slots())
         .map(|_| Slot {
-            coupling: 0.2 * noise.draw(),
-            noise_px: [0, 1].map(|_| NOISE_PX * (0.3 * noise.draw()).exp()),
+            coupling: lean.unwrap_or_else(|| 0.2 * noise.draw()),
+            noise_px: [1.0, if lean.is_some() { 1e3 } else { 1.0 }]
+                .map(|wide| wide * NOISE_PX * (0.3 * noise.draw()).exp()),
         })
         .collect();
     let mut memory = Box::new(Memory::new());
@@ -230,4 +246,77 @@ fn a_tone_at_an_image_of_a_larger_one_is_in_doubt() {
         assert_eq!(hz, [83.0, 144.0], "{:?}", report.peaks);
         assert!(!report.peaks[0].ambiguous && report.peaks[1].ambiguous);
     }
+}
+
+/// Both components and their phases, sines from the recording's beginning on, and an axis that is still.
+#[test]
+fn components_have_their_amplitudes_and_phases() {
+    for (seed, hz) in [(1, 61.9), (2, 131.9), (3, 311.0), (4, 407.3)] {
+        let averaged = hz * TAU * 0.5 * 90e-6 * 5.0;
+        let seen = averaged / averaged.sin();
+        let near = |value: Option<f32>, want: f64, sd: Option<f32>| {
+            let (value, sd) = (f64::from(value.unwrap()), f64::from(sd.unwrap()));
+            assert!(
+                (value - want).abs() < 4.0 * sd + 1e-3 * want,
+                "{hz} Hz: {value} for {want}"
+            );
+        };
+        let turned = |value: f32, want: f64| {
+            let off = (f64::from(value) - want + TAU / 2.0).rem_euclid(TAU) - TAU / 2.0;
+            assert!(off.abs() < 0.02, "{hz} Hz: {value} for {want}");
+        };
+        let report = planar(seed, |t, _| {
+            let p = TAU * hz * t + 0.4;
+            [0.2 * p.sin(), -0.1 * (p + 1.0).sin()]
+        });
+        let motion = only(&report, 0.0, "an orbit").motion.unwrap();
+        near(motion.x_px, 0.2 * seen, motion.x_px_sd);
+        near(motion.y_px, 0.1 * seen, motion.y_px_sd);
+        turned(motion.phase_rad, 0.4);
+        turned(motion.y_phase_rad.unwrap(), 1.4 + TAU / 2.0);
+        assert!(motion.rigid && motion.across_rad.is_none());
+        let report = planar(seed, |t, _| [0.2 * (TAU * hz * t).sin(), 0.0]);
+        let motion = only(&report, 0.0, "along x").motion.unwrap();
+        near(motion.x_px, 0.2 * seen, motion.x_px_sd);
+        assert!(motion.y_px.unwrap() < 4.0 * motion.y_px_sd.unwrap());
+        turned(motion.phase_rad, 0.0);
+    }
+}
+
+/// The shape of what bends is given over the rows.
+#[test]
+fn the_rows_of_what_bends_are_told() {
+    let reports = analysis(9, |t, eta| 0.3 * eta * (TAU * 97.3 * t + 1.0).sin());
+    let (report, shapes) = &reports;
+    let peak = only(report, 0.0, "a node");
+    assert!(!peak.motion.unwrap().rigid);
+    assert_eq!(shapes.len(), 1);
+    assert_eq!(shapes[0].hz, peak.hz);
+    assert_eq!(shapes[0].rows.len(), 9);
+    for row in &shapes[0].rows {
+        let eta = (f64::from(row.row) + 0.5) / 72.0 - 1.0;
+        let amplitude = f64::from(row.x_px) * f64::from(row.x_phase_rad - 1.0).cos();
+        assert!((amplitude - 0.3 * eta).abs() < 0.01, "{row:?}");
+        assert!(row.y_px == 0.0);
+    }
+}
+
+/// Where all edges lean one way, motion across them is told and nothing else.
+#[test]
+fn edges_that_lean_one_way_tell_the_motion_across_them() {
+    let angle = 0.6_f64;
+    let report = leaning(5, angle.tan(), |t| {
+        let s = (TAU * 131.9 * t).sin();
+        [0.2 * s, 0.05 * s]
+    });
+    let peak = only(&report, 0.0, "edges that lean");
+    let motion = peak.motion.unwrap();
+    assert!(motion.x_px.is_none() && motion.y_px.is_none() && motion.y_phase_rad.is_none());
+    assert!((f64::from(motion.across_rad.unwrap()) - angle).abs() < 2e-3);
+    let averaged = 131.9 * TAU * 0.5 * 90e-6 * 5.0;
+    let across = (0.2 * angle.cos() + 0.05 * angle.sin()) * averaged / averaged.sin();
+    assert!(
+        (f64::from(peak.amplitude_px) / across - 1.0).abs() < 0.01,
+        "{peak:?}"
+    );
 }

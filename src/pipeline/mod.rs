@@ -13,7 +13,7 @@ mod reporter;
 pub use collector::Collector;
 pub use reporter::Reporter;
 
-use crate::report::Report;
+use crate::report::{PeakShape, Report};
 use crate::spectrum::{Config, ConfigError, Storage};
 use crate::timeline::{Group, Sample};
 
@@ -82,6 +82,11 @@ impl<'a> Analyzer<'a> {
     pub fn finish(&mut self) -> Option<Report> {
         self.collector.finish();
         self.report()
+    }
+
+    /// How the peaks of the last report run over the rows that are not rigid: a shape is of the peak with its frequency.
+    pub fn shapes(&self) -> &[PeakShape] {
+        self.reporter.shapes()
     }
 
     /// Passes over the samples that the last window took: what its cost is proportional to.

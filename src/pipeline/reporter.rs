@@ -1,7 +1,7 @@
 //! The computing side: a window handed over becomes a report.
 
 use crate::math::since;
-use crate::report::{Report, Warning, Warnings};
+use crate::report::{PeakShape, Report, Warning, Warnings};
 use crate::spectrum::{
     Config, ConfigError, Estimator, EstimatorStorage, Follower, SampleBuffer, Tones, WindowMark,
     name_harmonics,
@@ -57,6 +57,12 @@ impl<'a> Reporter<'a> {
         self.estimator.load(mark, from, stride, column);
     }
 
+    /// How the peaks of the last report run over the rows that are not rigid, in no order: a shape is of the peak with its
+    /// frequency.
+    pub fn shapes(&self) -> &[PeakShape] {
+        self.estimator.shapes()
+    }
+
     /// The report of the window handed over last.
     pub fn report(&mut self) -> Report {
         let mut tones = self.estimator.tones();
@@ -83,6 +89,7 @@ impl<'a> Reporter<'a> {
             warnings: warnings(&mark, &tones),
             peaks: tones.peaks,
             um_per_px,
+            line_time_us_fit: tones.line_time_us_fit,
         }
     }
 }
@@ -93,6 +100,7 @@ fn warnings(mark: &WindowMark, tones: &Tones) -> Warnings {
     warnings.insert_if(mark.lost_frames > 0, Warning::LostFrames);
     warnings.insert_if(mark.short, Warning::ShortWindow);
     warnings.insert_if(tones.more, Warning::MoreTones);
+    warnings.insert_if(tones.timing_contradiction, Warning::TimingContradiction);
     warnings
 }
 

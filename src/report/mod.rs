@@ -1,10 +1,12 @@
 //! What is said about one window of time, in which units.
 
+mod motion;
 mod warnings;
 
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
+pub use motion::{MAX_SHAPES, Motion, PeakShape, SHAPE_ROWS, ShapeRow};
 pub use warnings::{Warning, Warnings};
 
 /// Most peaks one report can hold.
@@ -17,7 +19,8 @@ pub struct Peak {
     pub hz: f32,
     /// Standard deviation of the frequency, Hz.
     pub hz_sd: f32,
-    /// Zero-to-peak amplitude of the object's motion, px, the exposure's averaging undone.
+    /// Zero-to-peak amplitude of the object's motion in its largest direction (the semi-major axis of its orbit), px, at the
+    /// row where it is largest, the exposure's averaging undone.
     pub amplitude_px: f32,
     /// Standard deviation of the amplitude, px.
     pub amplitude_px_sd: f32,
@@ -29,6 +32,9 @@ pub struct Peak {
     pub track: u16,
     /// Which harmonic of the running speed, from 1, where one running speed explains it.
     pub harmonic: Option<u8>,
+    /// What it does along both axes; `None` from wires of version 1, which do not carry it.
+    #[serde(skip)]
+    pub motion: Option<Motion>,
 }
 
 /// One window of time, as a board sends it.
@@ -56,6 +62,10 @@ pub struct Report {
     pub um_per_px: Option<f32>,
     /// Velocity over 10–1000 Hz, mm/s RMS (ISO 20816's quantity), where there is a scale.
     pub velocity_mm_s_rms: Option<f32>,
+    /// What the line time must be if the frame rate is right, µs: where the motion contradicts the time base
+    /// ([`Warning::TimingContradiction`]) and exactly one value fits. Wires of version 1 do not carry it.
+    #[serde(skip)]
+    pub line_time_us_fit: Option<f32>,
 }
 
 impl Report {
@@ -72,6 +82,7 @@ impl Report {
         warnings: Warnings::NONE,
         um_per_px: None,
         velocity_mm_s_rms: None,
+        line_time_us_fit: None,
     };
 }
 

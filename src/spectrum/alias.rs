@@ -32,6 +32,13 @@ pub(crate) struct Scores {
     pseudo: Complex,
 }
 
+impl Scores {
+    /// Share of a tone's energy that is left in the scores.
+    pub(crate) fn plain(&self) -> f32 {
+        self.plain
+    }
+}
+
 /// A shape that was fitted to the scores at one frequency.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ShapeFit {
@@ -176,21 +183,30 @@ impl Samples<'_> {
 
     /// By how much bands of rows with an amplitude each would lower the sum of squares at `at`, and how many numbers they
     /// have.
-    pub(crate) fn free_gain(&self, scores: &Scores, at: Frequency, axes: [bool; 2]) -> (f32, f32) {
+    pub(crate) fn free_gain(
+        &self,
+        scores: &Scores,
+        at: Frequency,
+        axes: [bool; 2],
+        bands: usize,
+    ) -> (f32, f32) {
         let orders = axes.map(usize::from);
         let (mut gain, mut numbers) = (0.0, 0);
-        for band in self.bands() {
+        for band in self.bands(bands) {
             gain += self.shape_at(scores, at, orders, band).gain;
             numbers += 2 * (orders[0] + orders[1]);
         }
         (gain, numbers as f32)
     }
 
-    /// Bands of neighbouring slots, of about as many each.
-    pub(crate) fn bands(&self) -> impl Iterator<Item = core::ops::Range<usize>> + use<> {
+    /// No more than `most` bands of neighbouring slots, of about as many each.
+    pub(crate) fn bands(
+        &self,
+        most: usize,
+    ) -> impl Iterator<Item = core::ops::Range<usize>> + use<> {
         let knowing = self.knowing();
         let count = knowing.len();
-        let bands = count.clamp(1, BANDS);
+        let bands = count.min(most).max(1);
         (0..bands).map(move |b| {
             knowing.start + b * count / bands..knowing.start + (b + 1) * count / bands
         })

@@ -90,7 +90,7 @@ pub(crate) fn candidates(
         return found;
     };
     model.tabulate(samples);
-    for axis in 0..samples.channels {
+    for axis in 0..samples.axes {
         let information = spread(samples, model, points, g, axis);
         if information > 0.0 {
             let scale = 2.0 / information;
@@ -232,18 +232,7 @@ fn spread(
     g: Grid,
     axis: usize,
 ) -> f32 {
-    let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
-    for series in 0..samples.series() {
-        let sight = samples.sight(series);
-        let (w, x, y) = (
-            samples.series_weight[series],
-            sight.of_drift(0),
-            sight.of_drift(1),
-        );
-        xx += w * x * x;
-        xy += w * x * y;
-        yy += w * y * y;
-    }
+    let [xx, xy, yy] = samples.information();
     if xx <= 0.0 && axis == 0 {
         return 0.0;
     }

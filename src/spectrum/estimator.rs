@@ -7,9 +7,10 @@ use super::load::Loaded;
 use super::model::{Samples, TABLE_ROWS};
 use super::search::Search;
 use super::storage::{EstimatorStorage, MAX_GRID};
-use super::tones::{Telling, Tones};
+use super::tones::{Shapes, Telling, Tones};
 use super::window::{SampleBuffer, WindowMark, skew_unit_ns};
-use crate::report::MAX_PEAKS;
+use crate::math::since;
+use crate::report::{MAX_PEAKS, PeakShape};
 use crate::timeline::Group;
 
 /// Fits tones to windows.
@@ -22,6 +23,7 @@ pub struct Estimator<'a> {
     model: Model,
     mark: WindowMark,
     loaded: Loaded,
+    shapes: Shapes,
 }
 
 impl<'a> Estimator<'a> {
@@ -41,6 +43,7 @@ impl<'a> Estimator<'a> {
             model: Model::new(0),
             mark: WindowMark::default(),
             loaded: Loaded::default(),
+            shapes: Shapes::new(),
         };
         estimator.check_storage()?;
         Ok(estimator)
@@ -61,6 +64,7 @@ impl<'a> Estimator<'a> {
         self.model = Model::new(0);
         self.mark = WindowMark::default();
         self.loaded = Loaded::default();
+        self.shapes.clear();
         Ok(())
     }
 
@@ -122,6 +126,11 @@ impl<'a> Estimator<'a> {
         self.fit.passes
     }
 
+    /// How the peaks of the last window run over the rows that are not rigid.
+    pub fn shapes(&self) -> &[PeakShape] {
+        &self.shapes
+    }
+
     /// The window loaded last.
     pub const fn mark(&self) -> &WindowMark {
         &self.mark
@@ -143,6 +152,7 @@ impl<'a> Estimator<'a> {
     /// Fits tones to the loaded window.
     pub fn tones(&mut self) -> Tones {
         let l = self.loaded;
+        self.shapes.clear();
         if l.frames < 2 || l.count < 8 || l.total_weight <= 0.0 {
             return Tones::nothing(l.fps);
         }
@@ -164,8 +174,9 @@ impl<'a> Estimator<'a> {
             band,
             fps: l.fps,
             curvature: self.mark.curvature,
+            since_begin_ns: since(l.zero_ns, self.mark.origin_ns),
         }
-        .tones(&mut samples, &mut self.fit, &self.model);
+        .tones(&mut samples, &mut self.fit, &self.model, &mut self.shapes);
         tones.more |= outcome.more;
         tones
     }
@@ -213,10 +224,12 @@ fn view<'s>(
     frame_im[..frames].fill(0.0);
     slot_re[..slots].fill(1.0);
     slot_im[..slots].fill(0.0);
-    let samples = Samples {
+    let mut samples = Samples {
         frames,
         slots,
         channels: storage.samples.channels(slots),
+        axes: storage.samples.channels(slots),
+        lean: None,
         shift_px: storage.samples.shift_px,
         weight: storage.samples.weight,
         skew: storage.samples.skew,
@@ -246,5 +259,6 @@ fn view<'s>(
         count: l.count,
         length_s: l.length_s,
     };
+    samples.lean();
     (samples, storage.grid)
 }

@@ -114,7 +114,7 @@ impl Fit {
             .iter()
             .map(|t| 2 * t.shape.count() + if t.modulated { 3 } else { 1 })
             .sum();
-        let drift = samples.channels * model.drift_powers;
+        let drift = samples.axes * model.drift_powers;
         let notches = 4 * offsets * model.tones.iter().filter(|t| t.notched).count();
         samples.count as f32 - (offsets + drift + fitted + notches) as f32
     }
@@ -156,14 +156,14 @@ impl Fit {
                     self.evaluate(samples, model);
                     return;
                 }
-                let regressors = Regressors::of(&model.tones, model.drift_powers, samples.channels);
+                let regressors = Regressors::of(&model.tones, model.drift_powers, samples.axes);
                 self.apply(model, &regressors, shorter, samples.length_s);
                 continue;
             }
             if step == steps {
                 return;
             }
-            let regressors = Regressors::of(&model.tones, model.drift_powers, samples.channels);
+            let regressors = Regressors::of(&model.tones, model.drift_powers, samples.axes);
             let settled = !model.tones.iter().any(|t| t.shape.is_zero());
             // Near the end the matrix hardly changes: it serves as long as each step gains much less than the one before.
             if !current {
@@ -250,7 +250,7 @@ impl Fit {
     /// Prepares [`Fit::deviation`]; leaves the tables at `model`.
     pub(crate) fn weigh(&mut self, samples: &mut Samples<'_>, model: &Model) -> Regressors {
         model.tabulate(samples);
-        let regressors = Regressors::of(&model.tones, model.drift_powers, samples.channels);
+        let regressors = Regressors::of(&model.tones, model.drift_powers, samples.axes);
         samples.normal(&regressors, &model.tones, &mut self.normal);
         self.normal.factor();
         regressors

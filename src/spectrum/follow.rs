@@ -144,6 +144,7 @@ mod tests {
             ambiguous: false,
             track: 0,
             harmonic: None,
+            motion: None,
         }
     }
 

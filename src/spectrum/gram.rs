@@ -317,7 +317,7 @@ impl Samples<'_> {
     fn columns(&self, tones: &[Tone], k: usize) -> heapless::Vec<usize, BASIS> {
         match tone_of(tones, k) {
             Some(tone) => tone.shape.fitted().collect(),
-            None => CONSTANTS.into_iter().take(self.channels).collect(),
+            None => CONSTANTS.into_iter().take(self.axes).collect(),
         }
     }
 }

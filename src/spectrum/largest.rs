@@ -9,7 +9,7 @@ use super::shape::{BASIS, CONSTANTS, ORDERS, Shape, legendre};
 const PLACES: u16 = 49;
 
 /// A tone's motion at one place: an ellipse.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Orbit {
     /// Complex amplitudes along x and y, px.
     pub(crate) amplitudes: [Complex; 2],
@@ -69,13 +69,13 @@ pub(crate) fn largest(shape: &Shape) -> (f32, Orbit) {
     best
 }
 
-/// How the semi-major axis at `eta` follows the shape's coefficients.
-pub(crate) fn direction(eta: f32, orbit: &Orbit) -> Direction {
+/// How an amplitude at `eta` follows the shape's coefficients; `towards`: how it follows those along x and y there.
+pub(crate) fn direction(eta: f32, towards: [Complex; 2]) -> Direction {
     let mut direction = [Complex::new(0.0, 0.0); BASIS];
     let p = legendre(eta);
     for (axis, constant) in CONSTANTS.into_iter().enumerate() {
         for order in 0..ORDERS {
-            direction[constant + order] = orbit.towards[axis].scale(p[order]);
+            direction[constant + order] = towards[axis].scale(p[order]);
         }
     }
     direction

@@ -23,6 +23,8 @@ pub(crate) struct Loaded {
     pub(crate) length_s: f32,
     /// Frame rate, Hz; 0 with less than two frames.
     pub(crate) fps: f32,
+    /// Where times are 0 in the fit, ns on the camera's clock.
+    pub(crate) zero_ns: i64,
     /// All frames came at that one rate.
     pub(crate) steady_rate: bool,
 }
@@ -157,6 +159,7 @@ impl Loaded {
         let end = last.saturating_add(s.slot_ns[..slots].last().copied().unwrap_or(0));
         let span_ns = since(end, begin).max(1);
         let center = since(begin.saturating_add(span_ns / 2), middle);
+        self.zero_ns = center.saturating_add(middle);
         self.length_s = span_ns as f32 * 1e-9;
         self.total_weight = total;
         for i in 0..frames {

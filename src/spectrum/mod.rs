@@ -28,6 +28,7 @@ mod gram;
 mod largest;
 mod load;
 mod model;
+mod motion;
 mod notch;
 mod order;
 mod phase;

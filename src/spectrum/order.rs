@@ -1,6 +1,6 @@
 //! How many coefficients a tone's shape needs: an F test against what is left with more.
 
-use super::alias::{Scores, ShapeFit};
+use super::alias::{BANDS, Scores, ShapeFit};
 use super::fit::Model;
 use super::model::Samples;
 use super::phase::Frequency;
@@ -77,17 +77,22 @@ pub(crate) fn is_rare(f: f32, d1: f32, d2: f32) -> bool {
 }
 
 impl Samples<'_> {
-    /// One pass: what the tones of `model` leave at the alias frequency of tone `i`. The tables must be at `model`.
-    pub(crate) fn residue(&mut self, model: &Model, i: usize, variance: f32) -> Residue {
+    /// What the tones of `model` leave at the alias frequency of tone `i`, of which these are the scores.
+    pub(crate) fn residue(
+        &self,
+        scores: &Scores,
+        model: &Model,
+        i: usize,
+        variance: f32,
+    ) -> Residue {
         let Some(tone) = model.tones.get(i) else {
             return Residue {
                 chi2: 0.0,
                 freedom: 0.0,
             };
         };
-        let axes = [true, self.channels > 1];
-        let scores = self.score(model, i, |_| false);
-        let (gain, numbers) = self.free_gain(&scores, tone.frequency, axes);
+        let axes = [true, self.axes > 1];
+        let (gain, numbers) = self.free_gain(scores, tone.frequency, axes, BANDS);
         Residue {
             chi2: gain / variance,
             freedom: numbers - 2.0 * tone.shape.count() as f32,
@@ -99,7 +104,7 @@ impl Samples<'_> {
     pub(crate) fn grow(&self, scores: &Scores, at: Frequency, variance: f32) -> Grown {
         let along = |axes| self.grow_along(scores, at, axes, variance);
         let x = along([true, false]);
-        if self.channels < 2 {
+        if self.axes < 2 {
             return x;
         }
         let (y, both) = (along([false, true]), along([true, true]));
@@ -131,7 +136,7 @@ impl Samples<'_> {
     fn grow_along(&self, scores: &Scores, at: Frequency, axes: [bool; 2], variance: f32) -> Grown {
         let all = self.knowing();
         let most = all.len().saturating_sub(1) / 2;
-        let (free, numbers) = self.free_gain(scores, at, axes);
+        let (free, numbers) = self.free_gain(scores, at, axes, BANDS);
         let per_order = 2.0 * axes.iter().filter(|a| **a).count() as f32;
         let fit = |order: usize| {
             let orders = axes.map(|moves| if moves { order + 1 } else { 0 });

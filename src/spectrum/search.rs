@@ -157,7 +157,7 @@ impl Search {
     fn threshold(&self, samples: &Samples<'_>, model: &Model, axis: usize) -> f32 {
         // T_e = √(4π·var t) = 1.023 T for samples spread evenly.
         let widths = (self.band.highest_hz - self.band.lowest_hz) * samples.length_s * 1.023;
-        let alarms = match (samples.channels, axis) {
+        let alarms = match (samples.axes, axis) {
             (1, _) => self.false_alarm,
             (_, 0) => ALONG_X * self.false_alarm,
             _ => (1.0 - ALONG_X) * self.false_alarm,
@@ -519,7 +519,7 @@ impl Search {
         let mut weakest: Option<(usize, f32, f32)> = None;
         for (i, tone) in model.tones.iter().enumerate().filter(|(_, t)| !t.frozen) {
             let (eta, orbit) = largest(&tone.shape);
-            let along = direction(eta, &orbit);
+            let along = direction(eta, orbit.towards);
             let unit = fit.deviation(&regressors, i, samples.length_s, &along);
             let over = orbit.semi_major_px / unit.amplitude_px;
             let gain = over * over;

@@ -71,7 +71,7 @@ impl Search {
         model.tabulate(samples);
         let scores = samples.score(model, i, |j| j == i);
         fit.passes = fit.passes.saturating_add(1);
-        let axes = [true, samples.channels > 1];
+        let axes = [true, samples.axes > 1];
         let here = samples.grow(&scores, tone.frequency, variance);
         // At an image nothing low fits, and growth has to beat what is left: that alone would not tell.
         if !here.residual.is_more_than_noise() && here.fit.shape.orders() == tone.shape.orders() {
@@ -115,7 +115,7 @@ impl Search {
                 tone.shape = tone.shape.conjugate();
             }
         }
-        if !Regressors::have_room(&trial.tones, samples.channels) {
+        if !Regressors::have_room(&trial.tones, samples.axes) {
             return false;
         }
         fit.refine(samples, &mut trial, STEPS);
@@ -166,7 +166,8 @@ impl Search {
         // What both of them leave there.
         model.tabulate(samples);
         fit.passes = fit.passes.saturating_add(1);
-        let mut left = samples.residue(model, i, variance);
+        let scores = samples.score(model, i, |_| false);
+        let mut left = samples.residue(&scores, model, i, variance);
         left.freedom -= model
             .tones
             .last()

@@ -1,12 +1,18 @@
 //! What is said of the fitted tones: amplitudes of the object, standard deviations, what is not to be trusted.
 
+use num_complex::Complex32 as Complex;
+
 use super::config::Config;
 use super::detect::Band;
 use super::fit::{Fit, Model};
-use super::largest::{direction, largest};
+use super::gram::Regressors;
+use super::largest::{Orbit, direction, largest};
 use super::model::Samples;
+use super::motion::{Bands, Scale, believe_bands, over_rows};
 use super::smear::Smear;
-use crate::report::{MAX_PEAKS, Peak};
+use super::tone::Tone;
+use crate::math::sqrtf;
+use crate::report::{MAX_PEAKS, MAX_SHAPES, Motion, Peak, PeakShape};
 use crate::timeline::{Curvature, Group};
 
 /// Below this share of an amplitude left by exposure and averaging, a tone is not reported: its amplitude would
@@ -40,6 +46,10 @@ pub struct Tones {
     pub more: bool,
     /// A vibration at a multiple of the frame rate would not be seen.
     pub hidden: bool,
+    /// The motion contradicts the product of frame rate and line time.
+    pub timing_contradiction: bool,
+    /// What the line time must be if the frame rate is right, µs, where one value fits.
+    pub line_time_us_fit: Option<f32>,
     /// Frame rate, Hz; 0 with less than two frames.
     pub fps: f32,
     /// Standard deviation of a sample of average weight, px.
@@ -66,32 +76,70 @@ pub(crate) struct Telling<'a> {
     pub(crate) band: Band,
     pub(crate) fps: f32,
     pub(crate) curvature: Curvature,
+    /// From the recording's beginning to the time that is 0 in the fit, ns.
+    pub(crate) since_begin_ns: i64,
+}
+
+/// Peaks and how fast their frequencies change.
+type List = heapless::Vec<(Peak, f32), MAX_PEAKS>;
+
+/// Shapes over the rows of the peaks that are not rigid.
+pub(crate) type Shapes = heapless::Vec<PeakShape, MAX_SHAPES>;
+
+/// What is known of a tone before exposure and averaging are undone, deviations for unit noise.
+#[derive(Clone, Debug, Default)]
+struct Told {
+    semi_major_px: f32,
+    unit: f32,
+    unit_hz: f32,
+    orbit: Orbit,
+    /// Amplitude and its deviation along x and y.
+    axes: [Option<(f32, f32)>; 2],
+    /// Over the noise in the whole window.
+    power: f32,
+    /// What deviations of the frequency are to be multiplied by.
+    stretch: f32,
+    rigid: bool,
+    bands: Option<Bands>,
 }
 
 impl Telling<'_> {
     /// The tones of `model`, those that are asked for and known well enough.
-    pub(crate) fn tones(&self, samples: &mut Samples<'_>, fit: &mut Fit, model: &Model) -> Tones {
+    pub(crate) fn tones(
+        &self,
+        samples: &mut Samples<'_>,
+        fit: &mut Fit,
+        model: &Model,
+        shapes: &mut Shapes,
+    ) -> Tones {
         let mut tones = Tones::nothing(self.fps);
         // Weights have a mean of one, so this is px² already.
         let variance = model.squares / Fit::freedom(samples, model).max(1.0);
-        let noise = crate::math::sqrtf(variance);
+        let noise = sqrtf(variance);
         if noise.is_finite() {
             tones.sample_noise_px = noise;
-            tones.row_noise_px =
-                noise * crate::math::sqrtf(f32::from(self.group.rows_per_sample()));
+            tones.row_noise_px = noise * sqrtf(f32::from(self.group.rows_per_sample()));
         }
         let smear = Smear::of(self.group, self.curvature, model);
-        let mut list: heapless::Vec<(Peak, f32), MAX_PEAKS> = heapless::Vec::new();
-        self.tell(samples, fit, (model, variance), &smear, &mut list);
+        let mut list = List::new();
+        shapes.clear();
+        self.tell(samples, fit, (model, variance), &smear, (&mut list, shapes));
         if model.has_notches() {
             let mut strong = model.without_notches();
             fit.evaluate(samples, &mut strong);
-            self.tell(samples, fit, (&strong, variance), &smear, &mut list);
+            self.tell(
+                samples,
+                fit,
+                (&strong, variance),
+                &smear,
+                (&mut list, shapes),
+            );
         }
         largest_first(&mut list);
         self.doubt_images(samples.length_s, &mut list);
         tones.more = list.len() > self.config.max_peaks;
         list.truncate(self.config.max_peaks);
+        shapes.retain(|s| list.iter().any(|(p, _)| p.hz == s.hz));
         for (peak, slope) in &list {
             let _ = tones.peaks.push(*peak);
             let _ = tones.hz_per_s.push(*slope);
@@ -112,9 +160,9 @@ impl Telling<'_> {
         fit: &mut Fit,
         (model, variance): (&Model, f32),
         smear: &Smear<'_>,
-        list: &mut heapless::Vec<(Peak, f32), MAX_PEAKS>,
+        (list, shapes): (&mut List, &mut Shapes),
     ) {
-        let noise = crate::math::sqrtf(variance);
+        let noise = sqrtf(variance);
         let (low, high) = self.asked_hz();
         let regressors = fit.weigh(samples, model);
         for (i, tone) in model.tones.iter().enumerate().filter(|(_, t)| !t.frozen) {
@@ -123,36 +171,158 @@ impl Telling<'_> {
             if !(low..=high).contains(&hz) || attenuation < LEAST_ATTENUATION {
                 continue;
             }
-            let (eta, orbit) = largest(&tone.shape);
-            let amplitude = orbit.semi_major_px;
-            let along = direction(eta, &orbit);
-            let unit = fit.deviation(&regressors, i, samples.length_s, &along);
-            // One that changes is no standing deformation, wherever it is.
-            let kept = tone.modulated || samples.kept(&samples.frame_means(i + 1)) >= KEPT_ENOUGH;
-            let power = samples.total_weight * tone.shape.power() / (4.0 * variance).max(1e-30);
-            let amplitude_px = amplitude / attenuation;
-            let sd_px = noise * unit.amplitude_px / attenuation;
-            let doubt = if power > STRONG {
-                samples.residue(model, i, variance).stretch()
+            let told = self.told(samples, fit, &regressors, (model, i), variance);
+            let smeared = smear.correction(told.semi_major_px / attenuation, hz);
+            let turned = if self.group.exposed(hz) < 0.0 {
+                -1.0
             } else {
                 1.0
             };
-            let smeared = smear.correction(amplitude_px, hz);
+            let scale = Scale {
+                factor: turned * smeared.scale / attenuation,
+                zero_ns: self.since_begin_ns,
+            };
+            // One that changes is no standing deformation, wherever it is.
+            let kept = tone.modulated || samples.kept(&samples.frame_means(i + 1)) >= KEPT_ENOUGH;
+            let amplitude_px = told.semi_major_px * scale.factor.abs();
+            let sd_px = noise * told.unit / attenuation;
             let doubt_px = smeared.doubt * amplitude_px;
             let peak = Peak {
                 hz,
-                hz_sd: noise * unit.hz * doubt,
-                amplitude_px: amplitude_px * smeared.scale,
-                amplitude_px_sd: crate::math::sqrtf(sd_px * sd_px + doubt_px * doubt_px),
-                snr_db: 10.0 * libm::log10f(power.max(1e-9)),
+                hz_sd: noise * told.unit_hz * told.stretch,
+                amplitude_px,
+                amplitude_px_sd: sqrtf(sd_px * sd_px + doubt_px * doubt_px),
+                snr_db: 10.0 * libm::log10f(told.power.max(1e-9)),
                 ambiguous: self.near_multiple(hz, samples.length_s) || !kept || tone.unsure,
                 track: 0,
                 harmonic: None,
+                motion: Some(self.motion(samples, &told, tone, noise, scale)),
             };
-            if is_sound(&peak) {
-                let slope = tone.chirp / (samples.length_s * samples.length_s);
-                let _ = list.push((peak, slope));
+            if !is_sound(&peak) {
+                continue;
             }
+            let slope = tone.chirp / (samples.length_s * samples.length_s);
+            let _ = list.push((peak, slope));
+            if !told.rigid {
+                let _ = shapes.push(over_rows(
+                    samples,
+                    self.group,
+                    tone,
+                    told.bands.as_ref(),
+                    scale,
+                ));
+            }
+        }
+    }
+
+    /// What is to be told of tone `i` of `model`.
+    fn told(
+        &self,
+        samples: &mut Samples<'_>,
+        fit: &mut Fit,
+        regressors: &Regressors,
+        (model, i): (&Model, usize),
+        variance: f32,
+    ) -> Told {
+        let mut told = Told::default();
+        let Some(tone) = model.tones.get(i) else {
+            return told;
+        };
+        let (eta, orbit) = largest(&tone.shape);
+        let length_s = samples.length_s;
+        let along = |towards: [Complex; 2]| {
+            fit.deviation(regressors, i, length_s, &direction(eta, towards))
+        };
+        let unit = along(orbit.towards);
+        (told.unit, told.unit_hz) = (unit.amplitude_px, unit.hz);
+        (told.semi_major_px, told.orbit) = (orbit.semi_major_px, orbit);
+        for (axis, c) in orbit.amplitudes.into_iter().enumerate() {
+            if tone.shape.orders()[axis] > 0 {
+                let size = sqrtf(c.norm_sqr());
+                let mut towards = [Complex::new(0.0, 0.0); 2];
+                towards[axis] = if size > 0.0 {
+                    c.unscale(size)
+                } else {
+                    Complex::new(1.0, 0.0)
+                };
+                told.axes[axis] = Some((size, along(towards).amplitude_px));
+            }
+        }
+        told.rigid = tone.shape.orders().iter().all(|&o| o < 2);
+        told.power =
+            samples.seen_power(&tone.shape, tone.frequency.hz()) / (4.0 * variance).max(1e-30);
+        told.stretch = 1.0;
+        let still = samples.axes > 1 && told.axes.iter().any(Option::is_none);
+        if told.power < STRONG && !still {
+            return told;
+        }
+        let scores = samples.score(model, i, |_| false);
+        for axis in 0..samples.axes {
+            if told.axes[axis].is_none() {
+                let (size, square) = samples.beside(&scores, tone, axis, variance);
+                told.axes[axis] = Some((size, sqrtf(square / variance.max(1e-30))));
+            }
+        }
+        let residue = samples.residue(&scores, model, i, variance);
+        if told.power >= STRONG && !tone.modulated {
+            told.stretch = residue.stretch();
+            let smooth = samples.is_smooth(&scores, tone.frequency, variance);
+            if believe_bands(residue.each(), smooth) {
+                self.believe(samples, model, i, &mut told);
+            }
+        }
+        told
+    }
+
+    /// Takes the motion from bands of rows, the largest of them.
+    fn believe(&self, samples: &mut Samples<'_>, model: &Model, i: usize, told: &mut Told) {
+        let Some(tone) = model.tones.get(i) else {
+            return;
+        };
+        let scores = samples.score(model, i, |j| j == i);
+        let bands = samples.banded(&scores, tone.frequency, &tone.shape);
+        let mut best: Option<Orbit> = None;
+        for (_, orbit) in &bands {
+            if best.is_none_or(|b| orbit.semi_major_px > b.semi_major_px) {
+                best = Some(*orbit);
+            }
+        }
+        if let Some(orbit) = best {
+            for (known, c) in told.axes.iter_mut().zip(orbit.amplitudes) {
+                if let Some((size, _)) = known {
+                    *size = sqrtf(c.norm_sqr());
+                }
+            }
+            // A band has one of so many parts of the information.
+            let wider = sqrtf(bands.len() as f32);
+            told.unit = told.unit.max(wider * sqrtf(2.0 / samples.total_weight));
+            (told.semi_major_px, told.orbit, told.rigid) = (orbit.semi_major_px, orbit, false);
+            told.bands = Some(bands);
+        }
+    }
+
+    fn motion(
+        &self,
+        samples: &Samples<'_>,
+        told: &Told,
+        tone: &Tone,
+        noise: f32,
+        scale: Scale,
+    ) -> Motion {
+        let phase = |axis: usize| scale.polar(told.orbit.amplitudes[axis], tone.frequency).1;
+        let size = |axis: usize| told.axes[axis].map(|(size, _)| size * scale.factor.abs());
+        let sd = |axis: usize| told.axes[axis].map(|(_, unit)| unit * noise * scale.factor.abs());
+        let lean = samples.lean;
+        let of = |axis: usize, value: Option<f32>| value.filter(|_| lean.is_none() && axis < 2);
+        Motion {
+            x_px: of(0, size(0)),
+            x_px_sd: of(0, sd(0)),
+            y_px: of(1, size(1)),
+            y_px_sd: of(1, sd(1)),
+            phase_rad: phase(0),
+            y_phase_rad: of(1, size(1)).map(|_| phase(1)),
+            across_rad: lean.map(|[x, y]| libm::atan2f(y, x)),
+            rigid: told.rigid,
         }
     }
 

@@ -28,7 +28,7 @@ prop_compose! {
         snr_db in real(), ambiguous in any::<bool>(), track in any::<u16>(),
         harmonic in option::of(any::<u8>()),
     ) -> Peak {
-        Peak { hz, hz_sd, amplitude_px, amplitude_px_sd, snr_db, ambiguous, track, harmonic }
+        Peak { hz, hz_sd, amplitude_px, amplitude_px_sd, snr_db, ambiguous, track, harmonic, motion: None }
     }
 }
 
@@ -44,6 +44,7 @@ prop_compose! {
             seq, time_ms, window_s, fps, lines, lost_frames, noise_px,
             peaks: peaks.into_iter().collect(),
             warnings: Warnings::from(warnings), um_per_px, velocity_mm_s_rms,
+            line_time_us_fit: None,
         }
     }
 }
@@ -93,6 +94,7 @@ pub fn ordinary_report(seq: u32) -> Report {
         ambiguous: false,
         track,
         harmonic: None,
+        motion: None,
     };
     Report {
         seq,
@@ -112,6 +114,7 @@ pub fn ordinary_report(seq: u32) -> Report {
         warnings: Warnings::NONE,
         um_per_px: Some(50.0),
         velocity_mm_s_rms: Some(4.4512),
+        line_time_us_fit: None,
     }
 }
 

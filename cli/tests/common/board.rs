@@ -42,6 +42,7 @@ pub(crate) fn report(seq: u32) -> Report {
         ambiguous: false,
         track,
         harmonic: None,
+        motion: None,
     };
     Report {
         seq,

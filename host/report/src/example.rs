@@ -13,6 +13,7 @@ pub fn example(um_per_px: Option<f32>) -> Report {
         ambiguous: false,
         track: 1,
         harmonic: None,
+        motion: None,
     };
     Report {
         seq: 3,
@@ -28,5 +29,6 @@ pub fn example(um_per_px: Option<f32>) -> Report {
         warnings: Warnings::of(Warning::LostFrames).union(Warnings::of(Warning::Occluded)),
         um_per_px,
         velocity_mm_s_rms: None,
+        line_time_us_fit: None,
     }
 }

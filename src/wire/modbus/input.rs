@@ -189,6 +189,7 @@ pub fn decode_report(register: impl Fn(u16) -> Option<u16>) -> Option<Report> {
                 ambiguous: flags & 2 != 0,
                 track: register(at + 14)?,
                 harmonic: (flags & 4 != 0).then_some(harmonic),
+                motion: None,
             })
             .ok()?;
     }
@@ -207,6 +208,7 @@ pub fn decode_report(register: impl Fn(u16) -> Option<u16>) -> Option<Report> {
         velocity_mm_s_rms: (flags & 4 != 0).then_some(real(32)?),
         um_per_px: (flags & 2 != 0).then_some(real(34)?),
         peaks,
+        line_time_us_fit: None,
     };
     crate::wire::check_report(&report).ok().map(|()| report)
 }

@@ -168,6 +168,7 @@ fn read_report(mut fields: Fields<'_>) -> Result<Message, DecodeError> {
         um_per_px: fields.optional_real("um_per_px", resolution::UM_PER_PX)?,
         velocity_mm_s_rms: fields.optional_real("velocity_mm_s_rms", resolution::MM_S)?,
         peaks: Vec::new(),
+        line_time_us_fit: None,
     };
     let count: u32 = fields.integer("peaks")?;
     for _ in 0..count {
@@ -206,6 +207,7 @@ fn read_peak(text: &str) -> Result<Peak, DecodeError> {
             "-" => false,
             _ => return Err(DecodeError::Field("ambiguous")),
         },
+        motion: None,
     };
     fields.end()?;
     Ok(peak)

@@ -1,0 +1,56 @@
+//! How a tone moves the object: along which axes, in which phase, and whether all rows alike.
+
+use heapless::Vec;
+
+/// Rows of a [`PeakShape`].
+pub const SHAPE_ROWS: usize = 9;
+
+/// Most shapes kept of one window.
+pub const MAX_SHAPES: usize = 8;
+
+/// What a [`super::Peak`] does along both axes, at the row where it moves most. Wires of version 1 do not carry it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Motion {
+    /// Zero-to-peak amplitude along the rows, px; `None` where the texture cannot tell.
+    pub x_px: Option<f32>,
+    /// Standard deviation of `x_px`, px.
+    pub x_px_sd: Option<f32>,
+    /// Zero-to-peak amplitude along the columns, px; `None` where it was not measured or the texture cannot tell.
+    pub y_px: Option<f32>,
+    /// Standard deviation of `y_px`, px.
+    pub y_px_sd: Option<f32>,
+    /// Phase of x, −π to π rad: x is `x_px`·sin(2πf·t + phase), t from the start of the recording's first frame, x positive
+    /// to the right. Where the texture tells the motion in one direction only, the phase of that.
+    pub phase_rad: f32,
+    /// Phase of y in the same way, y positive downwards.
+    pub y_phase_rad: Option<f32>,
+    /// Where all edges lean one way: the direction across them, along which the amplitude was measured, rad from the right
+    /// downwards, −π/2 to π/2. Then there are neither x nor y.
+    pub across_rad: Option<f32>,
+    /// All rows move alike, as far as they tell.
+    pub rigid: bool,
+}
+
+/// How a peak's motion runs over the rows.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PeakShape {
+    /// Frequency of the peak, Hz: equal to [`super::Peak::hz`].
+    pub hz: f32,
+    /// Amplitudes at rows from the first that knows something to the last.
+    pub rows: Vec<ShapeRow, SHAPE_ROWS>,
+}
+
+/// A tone's motion at one row.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ShapeRow {
+    /// Row, counted in the part that is measured.
+    pub row: u16,
+    /// Zero-to-peak amplitude along the rows, px.
+    pub x_px: f32,
+    /// Phase of x, as [`Motion::phase_rad`].
+    pub x_phase_rad: f32,
+    /// Zero-to-peak amplitude along the columns, px; 0 where nothing is known of it.
+    pub y_px: f32,
+    /// Phase of y, as [`Motion::phase_rad`].
+    pub y_phase_rad: f32,
+}
