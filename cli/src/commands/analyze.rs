@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use clap::ValueEnum;
-use rowtone::report::{MAX_PEAKS, Report, Warnings};
+use rowtone::report::{MAX_PEAKS, PeakShape, Report, Warnings};
 use rowtone::wire::{Message, text as wire_text};
 
 use crate::output::Out;
@@ -212,13 +212,13 @@ impl Outlets {
                     picture.sample(sample);
                 }
             }
-            Event::Report(report) => self.report(report)?,
+            Event::Report(report, shapes) => self.report(report, shapes)?,
         }
         Ok(())
     }
 
     /// Hands a report on, as soon as it is known.
-    fn report(&mut self, report: &Report) -> Result<(), Failure> {
+    fn report(&mut self, report: &Report, shapes: &[PeakShape]) -> Result<(), Failure> {
         self.reports += 1;
         if let Some(picture) = &mut self.picture {
             picture.report(report);
@@ -241,7 +241,7 @@ impl Outlets {
         let out = &mut self.out;
         self.progress.aside(|| match self.format {
             Format::Text => out.line(&text::zoned(&brief, self.zone_limits.as_ref())),
-            Format::Json => out.line(&json::zoned(report, self.zone_limits.as_ref())),
+            Format::Json => out.line(&json::measured(report, shapes, self.zone_limits.as_ref())),
             Format::Wire => sentence.map_or(Ok(()), |s| out.line(s.trim_end_matches('\n'))),
         })
     }

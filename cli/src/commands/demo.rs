@@ -93,7 +93,7 @@ pub fn run(_args: &Args) -> Result<(), Failure> {
         match event {
             Event::Frame(_) => progress.step(),
             Event::Sample(_) => {}
-            Event::Report(report) => progress.aside(|| show(report, &mut out))?,
+            Event::Report(report, _) => progress.aside(|| show(report, &mut out))?,
         }
         Ok(())
     })

@@ -7,7 +7,7 @@ use std::collections::VecDeque;
 
 use rowtone::camera::Timing;
 use rowtone::pipeline::Analyzer;
-use rowtone::report::{Report, Warning};
+use rowtone::report::{PeakShape, Report, Warning};
 use rowtone::spectrum::Config;
 use rowtone::timeline::{Group, Sample, rows_per_sample};
 
@@ -135,8 +135,8 @@ pub enum Event<'a> {
     Frame(i64),
     /// Some rows of it, combined.
     Sample(&'a Sample),
-    /// A window is complete.
-    Report(&'a Report),
+    /// A window is complete; and how its peaks run over the rows that are not rigid, rows counted in the picture.
+    Report(&'a Report, &'a [PeakShape]),
 }
 
 /// The analysis of a recording.
@@ -250,6 +250,10 @@ impl<'a> Analysis<'a> {
         warnings.insert_if(unmeasured.learning > 0, Warning::Relearned);
         let little_texture = share(unmeasured.no_texture) > 0.5;
         warnings.insert_if(little_texture, Warning::LittleTexture);
-        on(Event::Report(&report))
+        let mut shapes = self.analyzer.shapes().to_vec();
+        for row in shapes.iter_mut().flat_map(|s| &mut s.rows) {
+            row.row = row.row.saturating_add(self.shifts.part.y as u16);
+        }
+        on(Event::Report(&report, &shapes))
     }
 }

@@ -1,6 +1,6 @@
 //! Reports as JSON Lines: one object a line, keys and units as `docs/` and `rowtone analyze --help` say.
 
-use rowtone::report::{Peak, Report};
+use rowtone::report::{Motion, Peak, PeakShape, Report, ShapeRow};
 use serde::Serialize;
 
 use super::zone::ZoneLimits;
@@ -20,6 +20,8 @@ struct ReportObject {
     #[serde(skip_serializing_if = "Option::is_none")]
     zone: Option<char>,
     peaks: Vec<PeakObject>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    timing: Option<TimingObject>,
     warnings: Vec<&'static str>,
 }
 
@@ -38,10 +40,74 @@ struct PeakObject {
     track: u16,
     #[serde(skip_serializing_if = "Option::is_none")]
     harmonic: Option<u8>,
+    #[serde(flatten)]
+    motion: Option<MotionObject>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    shape: Option<Vec<RowObject>>,
+}
+
+/// What only those know who measured: it is on no wire of version 1.
+#[derive(Serialize)]
+struct MotionObject {
+    x_px: Option<f32>,
+    x_px_sd: Option<f32>,
+    y_px: Option<f32>,
+    y_px_sd: Option<f32>,
+    phase_rad: f32,
+    y_phase_rad: Option<f32>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    across_rad: Option<f32>,
+    rigid: bool,
+}
+
+impl MotionObject {
+    fn new(motion: &Motion) -> Self {
+        Self {
+            x_px: motion.x_px,
+            x_px_sd: motion.x_px_sd,
+            y_px: motion.y_px,
+            y_px_sd: motion.y_px_sd,
+            phase_rad: motion.phase_rad,
+            y_phase_rad: motion.y_phase_rad,
+            across_rad: motion.across_rad,
+            rigid: motion.rigid,
+        }
+    }
+}
+
+#[derive(Serialize)]
+struct RowObject {
+    row: u16,
+    x_px: Option<f32>,
+    x_phase_rad: Option<f32>,
+    y_px: Option<f32>,
+    y_phase_rad: Option<f32>,
+}
+
+impl RowObject {
+    /// A row of a peak of which so much is known along either axis.
+    fn new(row: &ShapeRow, motion: Option<&Motion>) -> Self {
+        let known = |axis: fn(&Motion) -> Option<f32>| motion.is_some_and(|m| axis(m).is_some());
+        let (x, y) = (known(|m| m.x_px), known(|m| m.y_px));
+        Self {
+            row: row.row,
+            x_px: x.then_some(row.x_px),
+            x_phase_rad: x.then_some(row.x_phase_rad),
+            y_px: y.then_some(row.y_px),
+            y_phase_rad: y.then_some(row.y_phase_rad),
+        }
+    }
+}
+
+#[derive(Serialize)]
+struct TimingObject {
+    line_time_us_fit: Option<f32>,
 }
 
 impl PeakObject {
-    fn new(peak: &Peak, um_per_px: Option<f32>) -> Self {
+    fn new(peak: &Peak, um_per_px: Option<f32>, shapes: &[PeakShape]) -> Self {
+        let shape = shapes.iter().find(|s| s.hz == peak.hz);
+        let motion = peak.motion.as_ref();
         let amplitude_um = um_per_px.map(|scale| peak.amplitude_px * scale);
         Self {
             hz: peak.hz,
@@ -55,6 +121,8 @@ impl PeakObject {
             ambiguous: peak.ambiguous,
             track: peak.track,
             harmonic: peak.harmonic,
+            motion: motion.map(MotionObject::new),
+            shape: shape.map(|s| s.rows.iter().map(|r| RowObject::new(r, motion)).collect()),
         }
     }
 }
@@ -66,6 +134,24 @@ pub fn report(report: &Report) -> String {
 
 /// The same, with the machine's zone where the limits are given and there is a scale.
 pub fn zoned(report: &Report, limits: Option<&ZoneLimits>) -> String {
+    to_string(report, &[], limits, None)
+}
+
+/// The same of a recording that was measured here: with the shapes of those peaks that are not rigid, and what the motion says
+/// of the time base.
+pub fn measured(report: &Report, shapes: &[PeakShape], limits: Option<&ZoneLimits>) -> String {
+    let timing = TimingObject {
+        line_time_us_fit: report.line_time_us_fit,
+    };
+    to_string(report, shapes, limits, Some(timing))
+}
+
+fn to_string(
+    report: &Report,
+    shapes: &[PeakShape],
+    limits: Option<&ZoneLimits>,
+    timing: Option<TimingObject>,
+) -> String {
     let velocity = band_velocity(report);
     let object = ReportObject {
         seq: report.seq,
@@ -80,8 +166,9 @@ pub fn zoned(report: &Report, limits: Option<&ZoneLimits>) -> String {
         peaks: report
             .peaks
             .iter()
-            .map(|peak| PeakObject::new(peak, report.um_per_px))
+            .map(|peak| PeakObject::new(peak, report.um_per_px, shapes))
             .collect(),
+        timing,
         warnings: report.warnings.names().collect(),
     };
     // Numbers, strings and lists of them always serialise; a number that is not finite becomes null.
@@ -91,6 +178,7 @@ pub fn zoned(report: &Report, limits: Option<&ZoneLimits>) -> String {
 #[cfg(test)]
 mod tests {
     use crate::example;
+    use rowtone::report::{Motion, PeakShape, ShapeRow};
 
     #[test]
     fn the_keys_are_the_contract() {
@@ -103,6 +191,42 @@ mod tests {
                 r#""hz_sd":0.0004,"amplitude_px":0.02,"amplitude_px_sd":0.0002,"snr_db":61.2,"#,
                 r#""ambiguous":false,"track":1}],"warnings":["lost_frames","occluded"]}"#
             )
+        );
+    }
+
+    #[test]
+    fn what_was_measured_here_has_its_motion_and_its_shape() {
+        let mut report = example(None);
+        report.peaks.truncate(1);
+        report.peaks[0].motion = Some(Motion {
+            x_px: Some(0.3998),
+            x_px_sd: Some(0.0002),
+            y_px: None,
+            y_px_sd: None,
+            phase_rad: 0.31,
+            y_phase_rad: None,
+            across_rad: None,
+            rigid: false,
+        });
+        let row = ShapeRow {
+            row: 7,
+            x_px: 0.25,
+            x_phase_rad: -1.5,
+            ..ShapeRow::default()
+        };
+        let shape = PeakShape {
+            hz: report.peaks[0].hz,
+            rows: [row].into_iter().collect(),
+        };
+        let text = super::measured(&report, &[shape], None);
+        assert!(
+            text.contains(concat!(
+                r#""x_px":0.3998,"x_px_sd":0.0002,"y_px":null,"y_px_sd":null,"phase_rad":0.31,"#,
+                r#""y_phase_rad":null,"rigid":false,"shape":[{"row":7,"x_px":0.25,"#,
+                r#""x_phase_rad":-1.5,"y_px":null,"y_phase_rad":null}]}],"#,
+                r#""timing":{"line_time_us_fit":null}"#
+            )),
+            "{text}"
         );
     }
 

@@ -137,7 +137,7 @@ impl Recording {
         let mut memory = plan.memory();
         let mut last = None;
         Analysis::new(shifts, &plan, &mut memory)?.run(|event| {
-            if let Event::Report(report) = event {
+            if let Event::Report(report, _) = event {
                 last = Some(report.clone());
             }
             Ok(())
