@@ -40,6 +40,7 @@ mod small;
 mod smear;
 mod standing;
 mod storage;
+mod timebase;
 mod tone;
 mod tones;
 mod window;

@@ -10,6 +10,7 @@ use super::largest::{Orbit, direction, largest};
 use super::model::Samples;
 use super::motion::{Bands, Scale, believe_bands, over_rows};
 use super::smear::Smear;
+use super::timebase::Look;
 use super::tone::Tone;
 use crate::math::sqrtf;
 use crate::report::{MAX_PEAKS, MAX_SHAPES, Motion, Peak, PeakShape};
@@ -135,6 +136,7 @@ impl Telling<'_> {
                 (&mut list, shapes),
             );
         }
+        self.check_time_base(samples, fit, (model, variance), &mut tones);
         largest_first(&mut list);
         self.doubt_images(samples.length_s, &mut list);
         tones.more = list.len() > self.config.max_peaks;
@@ -151,6 +153,31 @@ impl Telling<'_> {
             first <= high.min(self.band.highest_hz)
         });
         tones
+    }
+
+    /// What the motion says of frame rate and line time.
+    fn check_time_base(
+        &self,
+        samples: &mut Samples<'_>,
+        fit: &mut Fit,
+        (model, variance): (&Model, f32),
+        tones: &mut Tones,
+    ) {
+        let Some(fps) = self.band.fps else { return };
+        let mut plain = model.clone();
+        for tone in &mut plain.tones {
+            tone.notched = false;
+        }
+        let look = Look {
+            model: &plain,
+            variance,
+            fps,
+            highest_hz: self.band.highest_hz,
+        };
+        let base = look.check(samples, fit);
+        let line_us = self.group.timing().line_time_ps() as f32 * 1e-6;
+        tones.timing_contradiction = base.contradiction;
+        tones.line_time_us_fit = base.ratio.map(|ratio| ratio * line_us);
     }
 
     /// The free tones of `model`, with the noise's variance.
