@@ -94,10 +94,15 @@ impl Look<'_> {
                 let _ = seen.push(tone);
             }
         }
-        base.contradiction = seen.iter().any(|s| self.off(s, 1.0) > s.tolerance_hz);
-        if base.contradiction {
-            base.ratio = self.ratio(&seen);
+        let off = seen.iter().filter(|s| self.off(s, 1.0) > s.tolerance_hz);
+        let off = off.count();
+        if off == 0 {
+            return base;
         }
+        let (ratio, others) = self.ratios(&seen);
+        // One that is off beside others that are not may be two tones at one alias frequency: then no factor fits all.
+        base.contradiction = others || 2 * off > seen.len();
+        base.ratio = ratio.filter(|_| base.contradiction);
         base
     }
 
@@ -184,7 +189,7 @@ impl Look<'_> {
         let both = samples.axes > 1;
         let slots = samples.knowing().len();
         let most = (slots.saturating_sub(1) / 2 + 1).min(ORDERS);
-        let mut best: Option<(f32, f32, f32)> = None;
+        let mut best: Option<(f32, f32, f32, f32)> = None;
         for order in 0..most {
             let around = Around {
                 scores: &scores,
@@ -203,19 +208,19 @@ impl Look<'_> {
             );
             let freedom = numbers - 2.0 * axes * (order + 1) as f32;
             let each = ((free - gain) / self.variance / freedom.max(1.0)).max(1.0);
-            let grown = best.is_none_or(|(_, before, _)| {
+            let grown = best.is_none_or(|(_, before, ..)| {
                 let f = (gain - before) / (2.0 * axes * self.variance) / each;
                 is_rare(f, 2.0 * axes, freedom)
             });
             if !grown {
                 break;
             }
-            best = Some((within_hz, gain, sd_hz * sqrtf(each)));
-            if freedom < 2.0 || each > MISFIT && order + 1 == most {
+            best = Some((within_hz, gain, sd_hz * sqrtf(each), each));
+            if freedom < 2.0 {
                 return None;
             }
         }
-        let (within_hz, _, sd_hz) = best?;
+        let (within_hz, _, sd_hz, _) = best.filter(|(.., each)| *each < MISFIT)?;
         Some(Seen {
             frequency: self.model.tones[i].frequency,
             within_hz,
@@ -231,35 +236,38 @@ impl Look<'_> {
         (ratio * away).abs()
     }
 
-    /// The one factor of the line time that all tones agree on.
-    fn ratio(&self, seen: &[Seen]) -> Option<f32> {
-        let sharp = |s: &&Seen| s.within_hz.abs() / s.sd_hz.max(1e-9);
+    /// The one factor of the line time that all tones agree on, and whether there is any, be it negative.
+    fn ratios(&self, seen: &[Seen]) -> (Option<f32>, bool) {
+        let sharp = |s: &Seen| s.within_hz.abs() / s.sd_hz.max(1e-9);
         let mut best: Option<&Seen> = None;
         for tone in seen {
-            if best.is_none_or(|b| sharp(&tone) > sharp(&b)) {
+            if best.is_none_or(|b| sharp(tone) > sharp(b)) {
                 best = Some(tone);
             }
         }
-        let best = best?;
-        let (mut only, mut near, mut count) = (None, None, 0_u32);
+        let Some(best) = best else {
+            return (None, false);
+        };
+        let (mut only, mut near, mut count, mut any) = (None, None, 0_u32, false);
         let highest = best.within_hz.abs() / LOWEST;
         let most = ((highest + best.frequency.hz()) / self.fps) as i32 + 1;
         for k in -most..=most {
             let at = best.frequency.hz() + k as f32 * self.fps;
             let ratio = best.within_hz / at;
-            if !(LOWEST..=1.0 / LOWEST).contains(&ratio) {
+            let fits = (LOWEST..=1.0 / LOWEST).contains(&ratio.abs())
+                && seen.iter().all(|s| self.off(s, ratio) < s.tolerance_hz);
+            any |= fits;
+            if !fits || ratio < 0.0 {
                 continue;
             }
-            if seen.iter().all(|s| self.off(s, ratio) < s.tolerance_hz) {
-                let ratio = self.settled(seen, ratio);
-                count += 1;
-                only = Some(ratio);
-                if (ratio - 1.0).abs() < NEAR {
-                    near = Some(ratio);
-                }
+            let ratio = self.settled(seen, ratio);
+            count += 1;
+            only = Some(ratio);
+            if (ratio - 1.0).abs() < NEAR {
+                near = Some(ratio);
             }
         }
-        near.or(only.filter(|_| count == 1))
+        (near.or(only.filter(|_| count == 1)), any)
     }
 
     /// The factor that fits all tones best, near `ratio`.
