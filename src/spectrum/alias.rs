@@ -93,6 +93,31 @@ impl Samples<'_> {
         }
     }
 
+    /// One pass: chi² for each degree of freedom of what the tones of `model` leave at the alias frequency of tone `i` in
+    /// single series, steadily and as it changes linearly in time.
+    pub(crate) fn steadiness(&mut self, model: &Model, i: usize, variance: f32) -> (f32, f32) {
+        let (n, k) = (self.frames, i + 1);
+        let (mut even, mut changing, mut count) = (0.0, 0.0, 0.0);
+        for series in 0..self.series() {
+            let w = self.series_weight[series];
+            if w <= 0.0 {
+                continue;
+            }
+            self.residual(series, &model.tones, &model.drift);
+            let (row, row_t) = (&self.row[..n], &mut self.row_t[..n]);
+            let _ = rows::times(row, &self.frame_t[..n], row_t);
+            let re = &self.frame_re[k * n..k * n + n];
+            let im = &self.frame_im[k * n..k * n + n];
+            let (zero, one) = rows::products(row, row_t, re, im);
+            // ½W of energy each, and of t a twelfth of it.
+            even += zero.norm_sqr() / w;
+            changing += 12.0 * one.norm_sqr() / w;
+            count += 1.0;
+        }
+        let scale = 1.0 / (variance * f32::max(count, 1.0));
+        (scale * even, scale * changing)
+    }
+
     /// The shape of so many coefficients along x and y at `at`, which may be negative for a mirror image, fitted to the
     /// scores of `slots`.
     pub(crate) fn shape_at(
@@ -104,53 +129,16 @@ impl Samples<'_> {
     ) -> ShapeFit {
         let mut shape = Shape::of_orders(orders[0], orders[1]);
         let fitted: heapless::Vec<usize, BASIS> = shape.fitted().collect();
-        let n = fitted.len();
         let hz = at.hz();
-        let mut side = [ZERO; BASIS];
-        let (mut plain, mut pseudo) = ([[ZERO; BASIS]; BASIS], [[ZERO; BASIS]; BASIS]);
-        for channel in 0..self.channels {
-            for slot in slots.clone() {
-                let series = channel * self.slots + slot;
-                let w = self.series_weight[series];
-                if w <= 0.0 {
-                    continue;
-                }
-                let (c, s) = cos_sin(at.phase(self.slot_ns[slot]));
-                let q = Complex::new(c, s) * blur(hz, &self.spread[slot], &self.even);
-                let z = Complex::new(self.score_re[series], self.score_im[series]);
-                let sight = self.sight(series);
-                let mut columns = [ZERO; BASIS];
-                for (d, &j) in columns.iter_mut().zip(&fitted) {
-                    *d = sight.column(j, hz) * q.conj();
-                }
-                for a in 0..n {
-                    let conj = columns[a].conj();
-                    side[a] += conj * z;
-                    for b in 0..=a {
-                        plain[a][b] += (conj * columns[b]).scale(w);
-                        pseudo[a][b] += (conj * columns[b].conj()).scale(w);
-                    }
-                }
+        let sums = self.inner_products(slots, fitted.len(), |series, columns| {
+            let q = self.turned(series, at);
+            let sight = self.sight(series);
+            for (d, &j) in columns.iter_mut().zip(&fitted) {
+                *d = sight.column(j, hz) * q;
             }
-        }
-        let mut small = Small::new(2 * n);
-        let mut right = [0.0; SMALL];
-        for a in 0..n {
-            (right[2 * a], right[2 * a + 1]) = (side[a].re, side[a].im);
-            for b in 0..=a {
-                let p = plain[a][b].scale(0.5 * scores.plain);
-                let q = scores.pseudo.scale(0.5) * pseudo[a][b];
-                small.add(2 * a, 2 * b, p.re + q.re);
-                small.add(2 * a, 2 * b + 1, q.im - p.im);
-                small.add(2 * a + 1, 2 * b, p.im + q.im);
-                small.add(2 * a + 1, 2 * b + 1, p.re - q.re);
-            }
-        }
-        let solution = small.solve(&right);
-        let mut gain = 0.0;
-        for (a, &j) in fitted.iter().enumerate() {
-            let c = Complex::new(solution[2 * a], solution[2 * a + 1]);
-            gain += (c.conj() * side[a]).re;
+        });
+        let (coefficients, gain) = sums.solve(scores);
+        for (&j, c) in fitted.iter().zip(coefficients) {
             shape.change(j, |own| *own = c);
         }
         let mut loss = 0.0;
@@ -160,7 +148,7 @@ impl Samples<'_> {
             for (a, &j) in fitted.iter().enumerate() {
                 for (b, &l) in fitted.iter().enumerate() {
                     if axis.contains(&j) && axis.contains(&l) {
-                        let weight = plain[a.max(b)][a.min(b)].re * 0.5 * scores.plain;
+                        let weight = sums.plain[a.max(b)][a.min(b)].re * 0.5 * scores.plain;
                         let (c, d) = (shape.coefficient(j), shape.coefficient(l));
                         size += weight * (c.conj() * d).re;
                         square += (c * d).scale(weight);
@@ -170,6 +158,66 @@ impl Samples<'_> {
             loss += 0.5 * (size - crate::math::sqrtf(square.norm_sqr())).max(0.0);
         }
         ShapeFit { shape, gain, loss }
+    }
+
+    /// By how much two rigid tones would lower the sum of squares, along those axes.
+    pub(crate) fn pair_gain(&self, scores: &Scores, pair: [Frequency; 2], axes: [bool; 2]) -> f32 {
+        let mut places: heapless::Vec<(Frequency, usize), 4> = heapless::Vec::new();
+        for at in pair {
+            for (axis, _) in axes.iter().enumerate().filter(|(_, moves)| **moves) {
+                let _ = places.push((at, CONSTANTS[axis]));
+            }
+        }
+        let sums = self.inner_products(self.knowing(), places.len(), |series, columns| {
+            let sight = self.sight(series);
+            for (d, &(at, j)) in columns.iter_mut().zip(&places) {
+                *d = sight.column(j, at.hz()) * self.turned(series, at);
+            }
+        });
+        sums.solve(scores).1
+    }
+
+    /// What turns an amplitude at `at` into what a series sees from the frames' times.
+    fn turned(&self, series: usize, at: Frequency) -> Complex {
+        let slot = series % self.slots.max(1);
+        let (c, s) = cos_sin(at.phase(self.slot_ns[slot]));
+        (Complex::new(c, s) * blur(at.hz(), &self.spread[slot], &self.even)).conj()
+    }
+
+    /// Sums of the scores' fit over the series of `slots`, of `n` columns that `fill` gives for each.
+    fn inner_products(
+        &self,
+        slots: core::ops::Range<usize>,
+        n: usize,
+        fill: impl Fn(usize, &mut [Complex; BASIS]),
+    ) -> ColumnSums {
+        let mut sums = ColumnSums {
+            n: n.min(BASIS),
+            side: [ZERO; BASIS],
+            plain: [[ZERO; BASIS]; BASIS],
+            pseudo: [[ZERO; BASIS]; BASIS],
+        };
+        for channel in 0..self.channels {
+            for slot in slots.clone() {
+                let series = channel * self.slots + slot;
+                let w = self.series_weight[series];
+                if w <= 0.0 {
+                    continue;
+                }
+                let mut columns = [ZERO; BASIS];
+                fill(series, &mut columns);
+                let z = Complex::new(self.score_re[series], self.score_im[series]);
+                for a in 0..sums.n {
+                    let conj = columns[a].conj();
+                    sums.side[a] += conj * z;
+                    for b in 0..=a {
+                        sums.plain[a][b] += (conj * columns[b]).scale(w);
+                        sums.pseudo[a][b] += (conj * columns[b].conj()).scale(w);
+                    }
+                }
+            }
+        }
+        sums
     }
 
     /// The slots that know something, from the first to the last.
@@ -210,5 +258,41 @@ impl Samples<'_> {
         (0..bands).map(move |b| {
             knowing.start + b * count / bands..knowing.start + (b + 1) * count / bands
         })
+    }
+}
+
+/// Inner products of columns with the scores and with each other.
+struct ColumnSums {
+    n: usize,
+    side: [Complex; BASIS],
+    plain: [[Complex; BASIS]; BASIS],
+    pseudo: [[Complex; BASIS]; BASIS],
+}
+
+impl ColumnSums {
+    /// The columns' amplitudes, and by how much they lower the sum of squares.
+    fn solve(&self, scores: &Scores) -> ([Complex; BASIS], f32) {
+        let n = self.n;
+        let mut small = Small::new(2 * n);
+        let mut right = [0.0; SMALL];
+        for a in 0..n {
+            (right[2 * a], right[2 * a + 1]) = (self.side[a].re, self.side[a].im);
+            for b in 0..=a {
+                let p = self.plain[a][b].scale(0.5 * scores.plain);
+                let q = scores.pseudo.scale(0.5) * self.pseudo[a][b];
+                small.add(2 * a, 2 * b, p.re + q.re);
+                small.add(2 * a, 2 * b + 1, q.im - p.im);
+                small.add(2 * a + 1, 2 * b, p.im + q.im);
+                small.add(2 * a + 1, 2 * b + 1, p.re - q.re);
+            }
+        }
+        let solution = small.solve(&right);
+        let mut amplitudes = [ZERO; BASIS];
+        let mut gain = 0.0;
+        for (a, c) in amplitudes.iter_mut().enumerate().take(n) {
+            *c = Complex::new(solution[2 * a], solution[2 * a + 1]);
+            gain += (c.conj() * self.side[a]).re;
+        }
+        (amplitudes, gain)
     }
 }

@@ -113,7 +113,8 @@ impl Search {
             for i in 0..model.tones.len() {
                 stood |= self.stand(samples, fit, model, i);
             }
-            if !exchanged && !dropped && !stood {
+            let notched = self.notch_misfit(samples, fit, model);
+            if !exchanged && !dropped && !stood && !notched {
                 break;
             }
         }

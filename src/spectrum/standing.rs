@@ -5,14 +5,15 @@
 //! shape stands: it is real but for one phase. Of all multiples k that one is taken where the shape explains most with a
 //! standing shape.
 
-use super::alias::ShapeFit;
+use super::alias::{Scores, ShapeFit};
 use super::fit::{Fit, Model};
 use super::gram::Regressors;
 use super::model::Samples;
 use super::order::Grown;
 use super::phase::Frequency;
 use super::search::Search;
-use super::shape::ORDERS;
+use super::shape::{ORDERS, Shape};
+use super::tone::Tone;
 
 /// Steps to refine with a shape.
 const STEPS: u32 = 12;
@@ -33,6 +34,12 @@ const APART: f32 = 50.0;
 
 /// What is this near to an image of a tone is at its alias frequency, turns a window length.
 const AS_IMAGE: f32 = 1.0;
+
+/// A further number has to explain so many noise variances more.
+const A_NUMBER: f32 = 4.0;
+
+/// What changes within the window by no more than this share of what does not is taken for steady.
+const STEADY: f32 = 0.3;
 
 /// Fewest slots that tell of a shape.
 const FEWEST_SLOTS: usize = 4;
@@ -118,13 +125,72 @@ impl Search {
         if !Regressors::have_room(&trial.tones, samples.axes) {
             return false;
         }
+        let axes = shape.orders().map(|o| o > 0);
+        let pair = (shape.orders() != axes.map(usize::from))
+            .then(|| self.best_pair(samples, &scores, tone.frequency, axes));
         fit.refine(samples, &mut trial, STEPS);
         let better =
             model.squares - trial.squares > WORTH * variance && self.sound(samples, &trial);
-        if better {
-            *model = trial;
+        if !better
+            || pair.flatten().is_some_and(|pair| {
+                self.are_two(samples, fit, (model, i), pair, (&trial, axes), variance)
+            })
+        {
+            return false;
         }
-        better
+        *model = trial;
+        true
+    }
+
+    /// Two rigid tones at the alias frequency that explain most.
+    fn best_pair(
+        &self,
+        samples: &Samples<'_>,
+        scores: &Scores,
+        frequency: Frequency,
+        axes: [bool; 2],
+    ) -> Option<[Frequency; 2]> {
+        let all = || self.multiples(frequency).enumerate();
+        let mut best: Option<([Frequency; 2], f32)> = None;
+        for (i, a) in all() {
+            for (_, b) in all().take(i) {
+                let gain = samples.pair_gain(scores, [a, b], axes);
+                if best.is_none_or(|(_, g)| gain > g) {
+                    best = Some(([a, b], gain));
+                }
+            }
+        }
+        best.map(|(pair, _)| pair)
+    }
+
+    /// Two rigid tones explain what tone `i` of `model` does with fewer numbers than the shape it has in `shaped`, or better.
+    fn are_two(
+        &self,
+        samples: &mut Samples<'_>,
+        fit: &mut Fit,
+        (model, i): (&Model, usize),
+        pair: [Frequency; 2],
+        (shaped, axes): (&Model, [bool; 2]),
+        variance: f32,
+    ) -> bool {
+        let mut two = model.clone();
+        let rigid = |at: Frequency| {
+            let at = if at.hz() < 0.0 { at.mirrored() } else { at };
+            Tone {
+                shape: Shape::of_orders(usize::from(axes[0]), usize::from(axes[1])),
+                ..Tone::steady(at, 0)
+            }
+        };
+        let Some(tone) = two.tones.get_mut(i) else {
+            return false;
+        };
+        *tone = rigid(pair[0]);
+        if two.tones.len() >= samples.most_tones() || two.tones.push(rigid(pair[1])).is_err() {
+            return false;
+        }
+        fit.refine(samples, &mut two, STEPS);
+        let more = A_NUMBER * variance * (numbers(&two) - numbers(shaped));
+        two.squares + more < shaped.squares && self.sound(samples, &two)
     }
 
     /// All frequencies that frames cannot tell from this one, within the band; those of mirror images are negative.
@@ -158,46 +224,97 @@ impl Search {
         without.tones.pop();
         fit.refine(samples, &mut without, STEPS);
         if self.stand(samples, fit, &mut without, i)
-            && without.squares < model.squares + WORTH * variance
+            && without.squares
+                < model.squares + A_NUMBER * variance * (numbers(model) - numbers(&without))
         {
             *model = without;
             return;
         }
-        // What both of them leave there.
+        if self.is_misfit(samples, fit, model, i, true) {
+            self.give_notch(samples, fit, model, i);
+        }
+    }
+
+    /// At the end of the search: gives a notch to a tone of which something smaller was found at its images, and which leaves
+    /// more there still. Says whether there was one.
+    pub(crate) fn notch_misfit(
+        &self,
+        samples: &mut Samples<'_>,
+        fit: &mut Fit,
+        model: &mut Model,
+    ) -> bool {
+        for i in 0..model.tones.len() {
+            let Some(tone) = model.tones.get(i).copied() else {
+                return false;
+            };
+            let power = tone.shape.power();
+            let imaged = model.tones.iter().any(|t| {
+                t.shape.power() < power && self.is_image(samples, t.frequency, tone.frequency)
+            });
+            if tone.notched || !imaged || self.tired(fit) {
+                continue;
+            }
+            if self.is_misfit(samples, fit, model, i, false) {
+                self.give_notch(samples, fit, model, i);
+                return true;
+            }
+        }
+        false
+    }
+
+    /// All tones at the alias frequency of tone `i` leave more there than noise; if asked for, as much at all times.
+    fn is_misfit(
+        &self,
+        samples: &mut Samples<'_>,
+        fit: &mut Fit,
+        model: &Model,
+        i: usize,
+        steadily: bool,
+    ) -> bool {
+        let variance = model.squares / Fit::freedom(samples, model).max(1.0);
+        let Some(at) = model.tones.get(i).map(|t| t.frequency) else {
+            return false;
+        };
         model.tabulate(samples);
         fit.passes = fit.passes.saturating_add(1);
         let scores = samples.score(model, i, |_| false);
         let mut left = samples.residue(&scores, model, i, variance);
-        left.freedom -= model
-            .tones
-            .last()
-            .map_or(0.0, |t| 2.0 * t.shape.count() as f32);
+        for tone in &model.tones {
+            if self.is_image(samples, tone.frequency, at) {
+                left.freedom -= 2.0 * tone.shape.count() as f32;
+            }
+        }
         if !left.is_more_than_noise() {
+            return false;
+        }
+        if !steadily {
+            return true;
+        }
+        // What leaks from a tone near it that was not found yet is not the same at all times.
+        fit.passes = fit.passes.saturating_add(1);
+        let (even, changing) = samples.steadiness(model, i, variance);
+        changing - 1.0 < STEADY * (even - 1.0)
+    }
+
+    /// Gives tone `i` a notch; what was found at its images goes.
+    fn give_notch(&self, samples: &mut Samples<'_>, fit: &mut Fit, model: &mut Model, i: usize) {
+        let Some(tone) = model.tones.get_mut(i) else {
             return;
-        }
-        if let Some(tone) = without.tones.get_mut(i) {
-            (tone.notched, tone.frozen) = (true, true);
-        }
-        // What was found at the other images of it goes too.
-        let own = without
-            .tones
-            .get(i)
-            .map(|t| t.frequency)
-            .unwrap_or_default();
+        };
+        (tone.notched, tone.frozen) = (true, true);
+        let own = tone.frequency;
         let mut at = 0;
-        while at < without.tones.len() {
-            let tone = without.tones.get(at);
-            let image = tone.is_some_and(|t| {
+        while at < model.tones.len() {
+            let image = model.tones.get(at).is_some_and(|t| {
                 t.frequency != own && !t.notched && self.is_image(samples, t.frequency, own)
             });
             if image {
-                without.tones.remove(at);
+                model.tones.remove(at);
             } else {
                 at += 1;
             }
         }
-        fit.refine(samples, &mut without, STEPS);
-        *model = without;
+        fit.refine(samples, model, STEPS);
     }
 
     /// Whether something at `at` is hidden by a notch.
@@ -224,6 +341,12 @@ impl Search {
             away.abs() * length_s < AS_IMAGE
         })
     }
+}
+
+/// Numbers that are fitted to the tones of a model.
+fn numbers(model: &Model) -> f32 {
+    let of = |t: &Tone| 2 * t.shape.count() + 1;
+    model.tones.iter().map(of).sum::<usize>() as f32
 }
 
 /// The shape is real but for one phase along either axis, as far as noise lets it tell.
