@@ -154,10 +154,15 @@ fn what_cannot_be_is_refused_in_one_line_with_the_right_status() {
 #[test]
 fn a_picture_and_a_sound_become_a_clip() {
     let place = Place::new("files");
-    let grey = image::GrayImage::from_fn(80, 60, |x, y| {
-        image::Luma([((x * 37 + y * 11) % 256) as u8])
-    });
-    grey.save(place.0.join("wall.png")).expect("a picture");
+    let grey: Vec<u8> = (0..60)
+        .flat_map(|y| (0..80).map(move |x| ((x * 37 + y * 11) % 256) as u8))
+        .collect();
+    let file = std::fs::File::create(place.0.join("wall.png")).expect("a picture");
+    let mut encoder = png::Encoder::new(file, 80, 60);
+    encoder.set_color(png::ColorType::Grayscale);
+    let mut writer = encoder.write_header().expect("room");
+    writer.write_image_data(&grey).expect("room");
+    writer.finish().expect("room");
     let spec = hound::WavSpec {
         channels: 2,
         sample_rate: 8000,

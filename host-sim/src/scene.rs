@@ -293,8 +293,15 @@ mod tests {
     fn a_picture_file_is_read_and_a_wrong_one_refused_with_its_name() {
         let dir = std::env::temp_dir();
         let path = dir.join(format!("rowtone-scene-{}.png", std::process::id()));
-        let grey = image::GrayImage::from_fn(50, 40, |x, y| image::Luma([(x * 4 + y) as u8]));
-        grey.save(&path).expect("a temporary file");
+        let grey: Vec<u8> = (0..40)
+            .flat_map(|y| (0..50).map(move |x| (x * 4 + y) as u8))
+            .collect();
+        let file = std::fs::File::create(&path).expect("a temporary file");
+        let mut encoder = png::Encoder::new(file, 50, 40);
+        encoder.set_color(png::ColorType::Grayscale);
+        let mut writer = encoder.write_header().expect("room");
+        writer.write_image_data(&grey).expect("room");
+        writer.finish().expect("room");
         let strip = Scene::Picture { path: path.clone() }
             .strip(80, 20, 20, 0.0, 1)
             .expect("a good picture");

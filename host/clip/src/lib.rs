@@ -18,6 +18,7 @@ mod header;
 mod mapped;
 mod options;
 mod part;
+pub mod picture;
 mod pixel_format;
 #[cfg(target_os = "linux")]
 mod populate;

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use super::Args;
 use rowtone::camera::Pixels;
+use rowtone_clip::picture::{self, Grey};
 use rowtone_clip::{CameraArgs, Feed, Rect};
 use rowtone_failure::Failure;
 
@@ -77,13 +78,14 @@ fn picture(
     name: &str,
     sink: &mut impl FnMut(&[u16], usize),
 ) -> Result<(usize, usize), Failure> {
-    let picture = image::open(name)
-        .map_err(|e| Failure::input(format!("{name}: cannot be read as a picture: {e}")))?
-        .to_luma16();
-    let (width, height) = (picture.width() as usize, picture.height() as usize);
+    let Grey {
+        width,
+        height,
+        values,
+    } = picture::read(Path::new(name))
+        .map_err(|e| Failure::input(format!("{name}: cannot be read as a picture: {e}")))?;
     // Back to 8 bit, so that saturation is at 255 as in a video.
-    let values: Vec<u16> = picture
-        .into_raw()
+    let values: Vec<u16> = values
         .into_iter()
         .map(|v| (f32::from(v) / 257.0).round() as u16)
         .collect();
