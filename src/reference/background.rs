@@ -300,7 +300,8 @@ impl Store<'_> {
             };
         }
         let frames = 1.0 / self.keep_of(row);
-        let build = VerticalBuild::new(&self.recipe, frames, table, row, self.rows());
+        let build = VerticalBuild::new(&self.recipe, frames, table, row, self.rows())
+            .without(self.left_out(row));
         Work::BuildVertical { row, table, build }
     }
 

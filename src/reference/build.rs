@@ -7,6 +7,7 @@ mod vertical;
 
 use super::align::UNKNOWN_STEPS;
 use super::band::{HALFWAY, MAX_HALF, SLOPE};
+use super::static_pixels::{LEFT_OUT, NONE, weigh_nothing};
 use super::{Recipe, RowTable, Two, at_least_1};
 use crate::kernel::{Kernel, Wide};
 use core::ops::Range;
@@ -59,6 +60,8 @@ enum Step {
 #[derive(Clone, Copy, Debug)]
 pub struct Build {
     recipe: Recipe,
+    /// Columns of pixels that do not move with the row.
+    left_out: [u16; LEFT_OUT],
     /// How many frames the reference is the mean of.
     frames: f32,
     /// Pixel values in one reference count: a power of two, so that no bit differs from a division.
@@ -118,6 +121,7 @@ impl Build {
     pub fn new(recipe: &Recipe, frames: f32) -> Self {
         Self {
             recipe: *recipe,
+            left_out: [NONE; LEFT_OUT],
             frames: frames.max(1.0),
             per_count: 1.0 / recipe.counts_per_value,
             step: Step::Weigh,
@@ -136,6 +140,12 @@ impl Build {
             weight_power: 0.0,
             q: [0.0; 2 * LAGS + 1],
         }
+    }
+
+    /// The same, without these pixels and what the band's filter mixes with them.
+    pub(super) fn without(mut self, left_out: [u16; LEFT_OUT]) -> Self {
+        self.left_out = left_out;
+        self
     }
 
     /// Builds a row in one go.
@@ -265,6 +275,7 @@ impl Build {
         self.total += mean.iter().map(|&count| u64::from(count)).sum::<u64>();
         self.light += u64::from(r.kernel.light(span.start, mean));
         // Nothing but arithmetic, so that a desktop does several columns at once.
+        let first = span.start;
         for (((w, &count), &mask), x) in w.iter_mut().zip(mean).zip(mask).zip(span) {
             let value = f32::from(count) * self.per_count;
             let from_edge = x.min(last.saturating_sub(x));
@@ -277,6 +288,7 @@ impl Build {
             let used = (value < r.saturation) & (from_edge >= reach);
             *w = if used { full } else { 0.0 };
         }
+        weigh_nothing(w, first, &self.left_out, &r);
     }
 
     /// h ← −w · band-passed r'.

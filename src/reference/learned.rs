@@ -1,5 +1,7 @@
 //! What learning keeps of rows and columns while the reference is not finished.
 
+use super::static_pixels::Watched;
+
 /// What learning keeps of a row.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RowLearning {
@@ -14,6 +16,8 @@ pub struct RowLearning {
     pub(super) light: f32,
     /// Print of the row's last line; 0 where its coefficients are others since.
     pub(super) print: u32,
+    /// Its sharpest pixels, and those that are left out.
+    pub(super) watched: Watched,
 }
 
 /// What learning keeps of a column.
@@ -40,6 +44,7 @@ impl RowLearning {
         smear: 0,
         light: 0.0,
         print: 0,
+        watched: Watched::EMPTY,
     };
 
     pub(crate) fn frames(&self) -> u16 {

@@ -26,6 +26,7 @@ pub mod noise;
 mod planar;
 mod recipe;
 mod round;
+mod static_pixels;
 mod storage;
 mod store;
 mod vertical;

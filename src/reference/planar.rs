@@ -98,6 +98,7 @@ impl Store<'_> {
                 .get(row)
                 .map_or(1, RowLearning::frames),
         );
+        let left_out = self.left_out(row);
         let b = &mut self.buffers;
         let Some(v) = &mut b.vertical else { return };
         let (Some(first), Some(coefficients), Some(slot), Some(table)) = (
@@ -108,7 +109,7 @@ impl Store<'_> {
         ) else {
             return;
         };
-        let build = VerticalBuild::new(&self.recipe, frames, *table, row, rows);
+        let build = VerticalBuild::new(&self.recipe, frames, *table, row, rows).without(left_out);
         let built = build.all(&mut VerticalParts {
             picture: b.mean,
             row,

@@ -179,7 +179,7 @@ impl<'a> Store<'a> {
     pub(super) fn build_of(&self, row: usize) -> Build {
         let learning = self.buffers.learning.get(row);
         let frames = learning.map_or(1, RowLearning::frames);
-        Build::new(&self.recipe, f32::from(frames))
+        Build::new(&self.recipe, f32::from(frames)).without(self.left_out(row))
     }
 
     /// Builds a row's coefficients from its mean, in one go, and those of its second product from the rows beside it.

@@ -17,6 +17,12 @@ use crate::{
 /// A row that knows its shift no better than this is aligned like its neighbours, 1/px².
 const OWN_INFORMATION_PER_PX2: f32 = 25.0;
 
+/// Frames that a row is the mean of before its sharpest pixels are watched.
+const WATCH_AFTER: u16 = 3;
+
+/// Rows of a frame after which the prediction owes nothing to the frame before.
+const ROWS_TO_SETTLE: usize = 12;
+
 /// One row in so many measures the pixels' noise, in turns.
 const NOISE_ROWS: usize = 4;
 
@@ -61,6 +67,7 @@ impl Tracker<'_> {
             Stage::Rough => {
                 self.settle_noise();
                 self.store.mask_dead_columns();
+                self.store.leave_out_still_pixels();
                 self.settle_margin();
                 self.store.even_light();
                 self.store.centre_rows();
@@ -76,6 +83,7 @@ impl Tracker<'_> {
             }
             Stage::Refining => {
                 self.settle_noise();
+                self.store.leave_out_still_pixels();
                 self.settle_margin();
                 self.store.even_light();
                 self.store.build_all();
@@ -146,6 +154,15 @@ impl Tracker<'_> {
         let Some(&seen) = self.store.learning(row) else {
             return;
         };
+        // A row with a pixel that stands still is wrong itself; the first ones have none before them.
+        let moved_px = match row < ROWS_TO_SETTLE {
+            true => shift_px,
+            false => self.prediction.at(row),
+        };
+        if self.prediction.is_sure() {
+            self.store
+                .watch(row, pixels, moved_px, self.light.to_reference);
+        }
         if self.prediction.is_sure() {
             self.vetting.note_extent(self.prediction.at(row));
         }
@@ -160,6 +177,9 @@ impl Tracker<'_> {
         let place_px = [shift_px, down_px];
         self.store
             .average(row, pixels, place_px, self.light.to_reference, u16::MAX);
+        if seen.frames == WATCH_AFTER {
+            self.store.watch_row(row);
+        }
         if self.stage == Stage::Rough {
             let frames = seen.frames.saturating_add(1);
             if let Some(l) = self.store.learning_mut(row) {

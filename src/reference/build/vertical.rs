@@ -15,6 +15,7 @@
 //! needs. ∂r/∂y is made of other rows than the row itself, so only one of the four
 //! answers, h' to y, has the reference's noise in it; h' to x has that of what γ brought in.
 
+use super::super::static_pixels::LEFT_OUT;
 use super::{Build, LAGS, Step, WORST_SD_PX, correlation, inverse};
 use crate::reference::{
     Recipe, RowTable, Two, VerticalTable,
@@ -144,6 +145,12 @@ impl VerticalBuild {
     fn reach(recipe: &Recipe, row: usize, rows: usize) -> usize {
         let below = rows.saturating_sub(row + 1);
         (row.min(below) / recipe.stride).min(LAGS)
+    }
+
+    /// The same, without these pixels and what the band's filter mixes with them.
+    pub(in crate::reference) fn without(mut self, left_out: [u16; LEFT_OUT]) -> Self {
+        self.build = self.build.without(left_out);
+        self
     }
 
     /// Begins a row of `rows`, whose first product has this table. `frames`: how many frames the reference is the mean of.

@@ -160,3 +160,18 @@ fn a_soft_shadow_that_passes_while_learning_leaves_the_rest_right() {
         assert!(worst < 0.15, "{worst} px");
     }
 }
+
+#[test]
+fn pixels_that_stand_still_are_left_out_of_their_rows() {
+    for columns_per_line in [u16::MAX, 4] {
+        let (measured, worst, _) =
+            recording(columns_per_line, tone(13.7, 0.35), |_, row, p| match row {
+                14 => p[50] = 255,
+                17 => p[90] = 240,
+                20 => (p[40], p[70]) = (0, 250),
+                _ => {}
+            });
+        assert_eq!(measured, 60 * ROWS);
+        assert!(worst < 0.1, "{columns_per_line}: {worst} px");
+    }
+}
