@@ -1,5 +1,6 @@
 //! A line to a board, read on a thread of its own: opened again whenever it comes back.
 
+use std::fs::File;
 use std::io::{ErrorKind, Read, Write};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::Duration;
@@ -24,7 +25,8 @@ pub enum Event {
 }
 
 /// Follows a port for as long as `event` returns true. It calls `event` at least every 100 ms,
-/// with no bytes where none came. `commands` are written to the port.
+/// with no bytes where none came. `commands` are written to the port; those that come while it is
+/// away are dropped.
 ///
 /// With `must_be_there`, a port that cannot be opened the first time ends it; else it is waited
 /// for from the start. Files and standard input are read once.
@@ -45,9 +47,11 @@ pub fn follow(
     let mut first = must_be_there;
     let mut said = false;
     loop {
-        match name.open() {
+        match leaving_room().and_then(|_room| name.open()) {
             Ok(mut port) => {
                 (first, said) = (false, false);
+                // What was meant for the board while it was away would come all at once.
+                commands.try_iter().for_each(drop);
                 if !event(Event::Open) {
                     return Ok(());
                 }
@@ -86,6 +90,19 @@ pub fn follow(
         }
         std::thread::sleep(AGAIN);
     }
+}
+
+/// Descriptors that lines leave for what else the program has to open: its files, its connections.
+const ROOM: usize = 6;
+
+/// Holds so many descriptors that as many are left when they are given back.
+///
+/// # Errors
+/// There are not so many.
+fn leaving_room() -> Result<Vec<File>, Failure> {
+    let some_file = if cfg!(unix) { "/dev/null" } else { "NUL" };
+    let held: std::io::Result<Vec<File>> = (0..ROOM).map(|_| File::open(some_file)).collect();
+    held.map_err(|error| Failure::input(format!("no port can be opened: {error}")))
 }
 
 fn read_stream(name: &PortName, mut event: impl FnMut(Event) -> bool) -> Result<(), Failure> {

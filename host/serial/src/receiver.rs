@@ -68,6 +68,8 @@ struct Asked {
     attempt: u32,
     /// First and last number.
     range: (u32, u32),
+    /// The board has said something since.
+    heard: bool,
 }
 
 /// Listens to one line.
@@ -79,6 +81,8 @@ pub struct Receiver {
     sequence: Sequence,
     missing: BTreeSet<u32>,
     asked: Option<Asked>,
+    /// There is no line to ask on.
+    away: bool,
     counters: Counters,
 }
 
@@ -101,6 +105,9 @@ impl Receiver {
                 match message {
                     Some(message) => {
                         self.wire = Some(wire);
+                        if let Some(asked) = &mut self.asked {
+                            asked.heard = true;
+                        }
                         if let Some(heard) = self.sort(message) {
                             to(heard);
                         }
@@ -113,11 +120,24 @@ impl Receiver {
         }
     }
 
+    /// Tells whether the line is there. On one that was away all that is missing is asked for anew,
+    /// however long that was.
+    pub fn set_line(&mut self, is_there: bool) {
+        self.away = !is_there;
+        self.asked = None;
+    }
+
     /// The command to send now: it asks for the oldest reports that are missing. It is given again
-    /// after a while, and after some times in vain the reports count as lost.
+    /// after a while, and after some times in vain the reports count as lost: while the board goes on
+    /// speaking, that is. Of one that says nothing the cable may be out, and what is written to it
+    /// may come all at once when it is back; it is asked once more, and then when it speaks again.
     pub fn ask(&mut self, now: Instant) -> Option<Vec<u8>> {
+        if self.away {
+            return None;
+        }
         let attempt = match self.asked {
             Some(asked) if now.duration_since(asked.at) < PATIENCE => return None,
+            Some(asked) if !asked.heard && asked.attempt > 1 => return None,
             Some(asked) => asked.attempt + 1,
             None => 1,
         };
@@ -130,6 +150,7 @@ impl Receiver {
             at: now,
             attempt,
             range: (first, last),
+            heard: false,
         });
         let mut line = String::new();
         // Writing to a string cannot fail.
@@ -237,13 +258,16 @@ mod tests {
             .to_vec()
     }
 
-    fn not_kept() -> Vec<u8> {
-        let text = "not kept: reports 9 to before 12 are; ask for those";
+    fn reply(ok: bool, text: &str) -> Vec<u8> {
         let text = text.try_into().unwrap();
         let mut buffer = [0; text::MAX_LINE];
-        text::encode_to_slice(&Message::Reply(Reply { ok: false, text }), &mut buffer)
+        text::encode_to_slice(&Message::Reply(Reply { ok, text }), &mut buffer)
             .unwrap()
             .to_vec()
+    }
+
+    fn not_kept() -> Vec<u8> {
+        reply(false, "not kept: reports 9 to before 12 are; ask for those")
     }
 
     fn numbers(receiver: &mut Receiver, bytes: &[u8]) -> Vec<u32> {
@@ -277,6 +301,8 @@ mod tests {
             let asked = receiver.ask(at(3 * u64::from(attempt))).unwrap();
             let asked = String::from_utf8(asked).unwrap();
             assert!(asked.contains("resend 6 6*"), "{asked}");
+            // It speaks, of other things.
+            assert!(numbers(&mut receiver, &reply(true, "unit=1")).is_empty());
         }
         let asked = String::from_utf8(receiver.ask(at(50)).unwrap()).unwrap();
         assert!(asked.contains("resend 8 8*"), "{asked}");
@@ -300,5 +326,37 @@ mod tests {
             (receiver.counters().restarts, receiver.counters().lost),
             (1, 3)
         );
+    }
+
+    /// However long the cable is out: what is missing is asked for when the board is heard again or the
+    /// port is back, with few questions into the silence.
+    #[test]
+    fn a_cable_that_is_out_costs_no_attempts() {
+        let now = Instant::now();
+        let at = |s| now + Duration::from_secs(s);
+        for port_stays in [true, false] {
+            let mut receiver = Receiver::default();
+            numbers(&mut receiver, &[line(1, 0), line(1, 4)].concat());
+            assert!(receiver.ask(at(0)).is_some());
+            if !port_stays {
+                receiver.set_line(false);
+            }
+            let into_silence = (1..600).filter(|&s| receiver.ask(at(s)).is_some()).count();
+            assert_eq!(into_silence, usize::from(port_stays));
+            assert_eq!(receiver.complete(), Some((1, 0)));
+            if port_stays {
+                numbers(&mut receiver, &line(1, 5));
+            } else {
+                receiver.set_line(true);
+            }
+            let asked = String::from_utf8(receiver.ask(at(600)).unwrap()).unwrap();
+            assert!(asked.contains("resend 1 3*"), "{asked}");
+            assert_eq!(receiver.ask(at(601)), None);
+            let came = numbers(
+                &mut receiver,
+                &[line(1, 1), line(1, 2), line(1, 3)].concat(),
+            );
+            assert_eq!((came, receiver.counters().lost), (vec![1, 2, 3], 0));
+        }
     }
 }
