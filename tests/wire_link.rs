@@ -140,3 +140,26 @@ fn a_host_that_asks_again_misses_none() {
         assert_eq!(heard, (0..=newest).collect::<Vec<_>>(), "{wire:?}");
     }
 }
+
+/// A line that echoes: what the board says comes back to it, and is not answered.
+#[test]
+fn its_own_sentences_are_no_commands() {
+    let mut slots = [const { None }; 4];
+    let mut link = link(&mut slots, Wire::Text);
+    link.announce(0);
+    link.push(ordinary_report(0));
+    type_in(&mut link, "get hop\nnonsense\n");
+    let mut said = drain(&mut link);
+    assert_eq!(
+        said.iter().filter(|&&byte| byte == b'$').count(),
+        3,
+        "a third answer has no place"
+    );
+    for _ in 0..3 {
+        for &byte in &said {
+            link.receive(byte, 0, &mut Nowhere);
+        }
+        said = drain(&mut link);
+        assert!(said.is_empty(), "{}", String::from_utf8_lossy(&said));
+    }
+}

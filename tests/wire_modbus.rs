@@ -229,12 +229,68 @@ fn no_answer_where_none_is_due() {
     assert!(ask(&wrong, &mut console).is_empty());
     assert!(ask(&with_crc(&[8, 4, 0, 0, 0, 1]), &mut console).is_empty());
     assert!(ask(&with_crc(&[0, 4, 0, 0, 0, 1]), &mut console).is_empty());
+    // What another server has refused, and all that can look like it.
+    for function in 0x80..=0xff {
+        assert!(ask(&with_crc(&[9, function, 1]), &mut console).is_empty());
+    }
     for frame in [&[][..], &[9], &[9, 4], &[9, 4, 1]] {
         assert!(ask(frame, &mut console).is_empty());
     }
     // A broadcast write is carried out in silence.
     assert!(ask(&with_crc(&[0, 6, 0, 4, 0, 5]), &mut console).is_empty());
     assert_eq!(console.settings().max_peaks, 5);
+}
+
+/// Writes both registers of the lock.
+fn lock(number: u32) -> Vec<u8> {
+    let number = number.to_be_bytes();
+    with_crc(&[&[9, 16, 0, 30, 0, 2, 4], &number[..]].concat())
+}
+
+#[test]
+fn a_lock_keeps_writes_off() {
+    let (mut console, mut store) = (console(), Memory(None));
+    let mut ask = |frame: &[u8]| ask_with(frame, None, &mut console, &mut store);
+    let refused = |code| with_crc(&[9, 0x90, code]);
+    let is_locked = with_crc(&[9, 3, 0, 30, 0, 2]);
+    assert_eq!(ask(&is_locked), with_crc(&[9, 3, 4, 0, 0, 0, 0]));
+    assert_eq!(ask(&lock(70_000)), with_crc(&[9, 16, 0, 30, 0, 2]));
+    assert_eq!(
+        ask(&is_locked),
+        with_crc(&[9, 3, 4, 0, 0, 0, 1]),
+        "the number is not told"
+    );
+    // A write, a save, one to all, half of the lock, and one past it.
+    assert_eq!(ask(&with_crc(&[9, 6, 0, 4, 0, 5])), with_crc(&[9, 0x86, 1]));
+    assert_eq!(ask(&with_crc(&[9, 6, 0, 7, 0, 1])), with_crc(&[9, 0x86, 1]));
+    assert!(ask(&with_crc(&[0, 6, 0, 4, 0, 5])).is_empty());
+    assert_eq!(
+        ask(&with_crc(&[9, 6, 0, 30, 0, 0])),
+        with_crc(&[9, 0x86, 3])
+    );
+    assert_eq!(
+        ask(&with_crc(&[9, 6, 0, 32, 0, 0])),
+        with_crc(&[9, 0x86, 2])
+    );
+    assert_eq!(ask(&lock(70_001)), refused(3));
+    // The time stands still here, so the right one comes too soon.
+    assert_eq!(ask(&lock(70_000)), refused(3));
+    assert_eq!(
+        store.0.map(|kept| (kept.lock, kept.max_peaks)),
+        Some((Some(70_000), 8))
+    );
+    assert_eq!(console.settings().max_peaks, 8);
+
+    let (mut console, mut store) = (self::console(), Memory(None));
+    let mut ask = |frame: &[u8]| ask_with(frame, None, &mut console, &mut store);
+    ask(&lock(70_000));
+    ask(&lock(70_000));
+    assert_eq!(ask(&is_locked), with_crc(&[9, 3, 4, 0, 0, 0, 0]));
+    assert_eq!(
+        ask(&with_crc(&[9, 6, 0, 4, 0, 5])),
+        with_crc(&[9, 6, 0, 4, 0, 5])
+    );
+    assert_eq!(store.0.map(|kept| kept.lock), Some(None));
 }
 
 proptest! {
@@ -252,7 +308,11 @@ proptest! {
     ) {
         let mut console = console();
         let response = ask(&with_crc(&[&[9, function], data.as_slice()].concat()), &mut console);
-        prop_assert!(response.len() >= 5 && response[0] == 9 && response[1] & 0x7f == function & 0x7f);
+        if function & 0x80 != 0 {
+            prop_assert!(response.is_empty(), "a refusal is no request");
+        } else {
+            prop_assert!(response.len() >= 5 && response[0] == 9 && response[1] & 0x7f == function);
+        }
         prop_assert!(console.settings().check(&console.board().limits).is_ok());
     }
 

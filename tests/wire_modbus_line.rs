@@ -115,3 +115,35 @@ fn a_report_is_whole_or_none() {
         }
     }
 }
+
+/// A bus on which the board hears itself: each of its responses comes back once, and is no request.
+#[test]
+fn a_bus_that_echoes() {
+    let crc = crc::Crc::<u16>::new(&crc::CRC_16_MODBUS);
+    let framed = |request: &[u8]| [request, &crc.checksum(request).to_le_bytes()].concat();
+    let requests = [
+        framed(&[UNIT, 6, 0, 4, 0, 5]), // answered by itself
+        framed(&[UNIT, 6, 0, 7, 0, 1]), // save, which is refused here
+        framed(&[UNIT, 16, 0, 4, 0, 1, 2, 0, 6]),
+        framed(&[UNIT, 3, 0, 0, 0, 4]),
+        framed(&[UNIT, 4, 0, 0, 0, 1]),
+        framed(&[UNIT, 7]),
+    ];
+    for (request, late_us) in requests.iter().flat_map(|r| [(r, 0), (r, 15_000)]) {
+        let mut slots = [const { None }; 4];
+        let mut server = Server::new(&mut slots, 115_200);
+        let response = server.ask(request);
+        assert!(!response.is_empty());
+        server.now_us += late_us;
+        server.hear(&response);
+        for _ in 0..5 {
+            let again = server.after(SILENCE_US);
+            assert!(again.is_empty(), "{request:?}: {again:?}");
+        }
+        // The client says the same once more, and is answered.
+        server.now_us += 100_000;
+        assert_eq!(server.ask(request), response);
+        server.now_us += 100_000;
+        assert_eq!(server.ask(request), response);
+    }
+}

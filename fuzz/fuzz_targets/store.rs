@@ -57,11 +57,11 @@ impl NorFlash for Flash {
 }
 
 /// `content` of a slot under a right head and checksum.
-fn slot(number: u32, content: &[u8]) -> [u8; SLOT_LEN] {
+fn slot(version: u8, number: u32, content: &[u8]) -> [u8; SLOT_LEN] {
     let mut bytes = [0xff; SLOT_LEN];
     let content = &content[..content.len().min(SLOT_LEN - 14)];
     let end = 10 + content.len();
-    bytes[..4].copy_from_slice(b"RTS\x01");
+    bytes[..4].copy_from_slice(&[b'R', b'T', b'S', version]);
     bytes[4..8].copy_from_slice(&number.to_le_bytes());
     bytes[8..10].copy_from_slice(&(content.len() as u16).to_le_bytes());
     bytes[10..end].copy_from_slice(content);
@@ -78,7 +78,8 @@ fuzz_target!(|data: &[u8]| {
     for (at, content) in [(0, first), (1, second)] {
         let part = &mut bytes[at * SLOT_LEN..][..SLOT_LEN];
         if kind & (1 << at) != 0 {
-            part.copy_from_slice(&slot(u32::from(*number).wrapping_add(at as u32).wrapping_sub(1), content));
+            let version = 1 + (kind >> 2 & 1);
+            part.copy_from_slice(&slot(version, u32::from(*number).wrapping_add(at as u32).wrapping_sub(1), content));
         } else {
             let len = content.len().min(SLOT_LEN);
             part[..len].copy_from_slice(&content[..len]);

@@ -22,6 +22,10 @@ use settings::{Console, Wire};
 /// Most answers that can wait for the line. A command that comes while so many wait is refused.
 pub const MAX_ANSWERS: usize = 2;
 
+/// How late the echo of a Modbus response may come behind it, µs: adapters hold bytes back for some
+/// milliseconds.
+const ECHO_US: u64 = 20_000;
+
 /// One serial line.
 ///
 /// ```
@@ -54,6 +58,9 @@ pub struct Link<'a> {
     lines: LineReader,
     frames: FrameReader,
     answers: Deque<Message, MAX_ANSWERS>,
+    /// The last Modbus response, until it has come back, and by when it does on a bus that echoes, µs.
+    echo: Vec<u8, { crate::wire::modbus::MAX_FRAME }>,
+    echo_by_us: u64,
     /// What is being sent, and how much of it the line has taken.
     buffer: Vec<u8, { text::MAX_LINE }>,
     taken: usize,
@@ -68,6 +75,8 @@ impl<'a> Link<'a> {
             lines: LineReader::new(),
             frames: FrameReader::new(baud),
             answers: Deque::new(),
+            echo: Vec::new(),
+            echo_by_us: 0,
             buffer: Vec::new(),
             taken: 0,
         }
@@ -166,6 +175,14 @@ impl<'a> Link<'a> {
         let Some(frame) = self.frames.frame(now_us) else {
             return;
         };
+        // What this end has said itself is no request. The response to a write of one register looks
+        // like one, though, and a client may say it again, if not so soon.
+        let is_response = !self.echo.is_empty() && frame == self.echo.as_slice();
+        let is_write = frame.get(1) == Some(&6);
+        if is_response && (!is_write || self.frames.began_us() <= self.echo_by_us) {
+            self.echo.clear();
+            return self.frames.clear();
+        }
         let status = self.console.status(now_us / 1000, &self.outbox);
         let state = State {
             status: &status,
@@ -174,6 +191,9 @@ impl<'a> Link<'a> {
         let mut response = Vec::new();
         modbus::answer(frame, &state, &mut self.console, store, &mut response);
         self.frames.clear();
+        let takes_us = self.frames.duration_us(response.len());
+        self.echo_by_us = now_us.saturating_add(takes_us).saturating_add(ECHO_US);
+        self.echo.clone_from(&response);
         // A frame is shorter than a line.
         let _ = self.buffer.extend_from_slice(&response);
     }

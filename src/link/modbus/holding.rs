@@ -11,6 +11,10 @@ pub const HOLDING_LEN: u16 = 20;
 /// It reads as 0.
 pub const COMMAND_AT: u16 = 7;
 
+/// Address of the lock, two registers: a number written there locks the settings, or unlocks them
+/// where it locked them. It reads as 1 where they are locked, else as 0.
+pub const LOCK_AT: u16 = 30;
+
 /// All holding registers at once: changed here, and only then made settings again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Image([u16; HOLDING_LEN as usize]);
@@ -80,6 +84,7 @@ impl Image {
             min_hz: optional(12)?,
             max_hz: optional(14)?,
             roi: (!whole).then_some(roi),
+            lock: None,
         })
     }
 
@@ -98,7 +103,7 @@ impl Image {
 
 /// Whether the register is half of a 32-bit value, and which half.
 fn half_of_pair(at: u16) -> Option<u16> {
-    matches!(at, 0..4 | 8..16).then_some(at & 1)
+    matches!(at, 0..4 | 8..16 ).then_some(at & 1)
 }
 
 /// Whether a write from `at` on cuts a 32-bit value in two.

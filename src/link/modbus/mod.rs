@@ -6,5 +6,5 @@
 mod holding;
 mod server;
 
-pub use holding::{COMMAND_AT, HOLDING_LEN};
+pub use holding::{COMMAND_AT, HOLDING_LEN, LOCK_AT};
 pub use server::{Exception, answer};

@@ -58,6 +58,8 @@ pub enum SettingsError {
     Wire(Wire),
     /// Not from 1 to 247.
     Unit(u8),
+    /// They are locked.
+    Locked,
 }
 
 impl fmt::Display for SettingsError {
@@ -103,6 +105,7 @@ impl fmt::Display for SettingsError {
                 f.write_str("wire is modbus; this firmware was built without it")
             }
             Self::Unit(unit) => write!(f, "unit is {unit}; give 1 to 247"),
+            Self::Locked => f.write_str("settings are locked; unlock them first"),
         }
     }
 }

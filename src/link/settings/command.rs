@@ -9,6 +9,9 @@
 //! | `save` | keeps the settings over the next start |
 //! | `defaults` | goes back to the built-in settings (`save` keeps that too) |
 //! | `resend N`, `resend N M` | sends report N, or reports N to M, once more |
+//! | `lock N` | locks the settings with a number of one's own, over the next start too |
+//! | `lock` | says whether they are locked |
+//! | `unlock N` | takes the lock away |
 //! | `help` | names the commands |
 //!
 //! A person types them as they are. A program puts them into a sentence with a checksum,
@@ -19,7 +22,7 @@ use core::fmt;
 use heapless::String;
 
 use super::real::whole;
-use super::{Key, Settings, SettingsError, ValueError};
+use super::{Key, LockError, Settings, SettingsError, ValueError};
 use crate::link::outbox::ResendError;
 use crate::wire::text::command_in_sentence;
 
@@ -43,6 +46,10 @@ pub enum Command<'a> {
     Defaults,
     /// Send reports once more, first and last number.
     Resend(u32, u32),
+    /// Lock the settings with a number, or say whether they are.
+    Lock(Option<u32>),
+    /// Take the lock away.
+    Unlock(u32),
     /// Name the commands.
     Help,
 }
@@ -76,6 +83,10 @@ pub enum CommandError<'a> {
     Fixed,
     /// The settings could not be kept; says why.
     Save(super::store::SaveError),
+    /// Not the number of a lock, which is 1 to 4294967295.
+    Code(&'a str),
+    /// The settings are locked, or are not, see [`LockError`].
+    Lock(LockError),
 }
 
 impl fmt::Display for CommandError<'_> {
@@ -97,6 +108,8 @@ impl fmt::Display for CommandError<'_> {
                 "settings: fixed here; give them to the program that measures"
             ),
             Self::Save(error) => error.fmt(f),
+            Self::Code(text) => write!(f, "{text}: give a number of 1 to 4294967295"),
+            Self::Lock(error) => error.fmt(f),
         }
     }
 }
@@ -158,12 +171,30 @@ pub fn parse<'a>(line: &'a str) -> Result<Command<'a>, CommandError<'a>> {
             let to = words.next().map_or(Ok(from), number)?;
             Command::Resend(from, to)
         }
+        "lock" => Command::Lock(words.next().map(code).transpose()?),
+        "unlock" => {
+            let missing = CommandError::Missing("the number that locks the settings");
+            Command::Unlock(words.next().map(code).ok_or(missing)??)
+        }
         word => return Err(CommandError::Unknown(word)),
     };
     match words.next() {
         Some(word) => Err(CommandError::TooMuch(word)),
         None => Ok(command),
     }
+}
+
+/// The number of a lock.
+fn code(text: &str) -> Result<u32, CommandError<'_>> {
+    let number = whole(text.as_bytes()).filter(|&number| number != 0);
+    number.ok_or(CommandError::Code(text))
+}
+
+/// Whether a line is a sentence of a board: answered, its answer would come back too, and so on.
+fn is_own(line: &str) -> bool {
+    ["$RTRPT,", "$RTSTA,", "$RTACK,", "$RTERR,"]
+        .iter()
+        .any(|start| line.starts_with(start))
 }
 
 /// Collects a command line from bytes as they come.
@@ -186,7 +217,8 @@ impl LineReader {
         }
     }
 
-    /// Takes the next byte. The line comes with its end (`\r`, `\n`, or both); empty lines do not.
+    /// Takes the next byte. The line comes with its end (`\r`, `\n`, or both); empty lines do not, and
+    /// neither do a board's own sentences, which come back on a line that echoes.
     ///
     /// # Errors
     /// The line was too long or is not text; the next one starts anew.
@@ -203,7 +235,7 @@ impl LineReader {
             return None;
         }
         self.complete = true;
-        if self.line.is_empty() {
+        if self.line.is_empty() || is_own(&self.line) {
             return None;
         }
         Some(match () {

@@ -6,6 +6,7 @@ use crate::link::outbox::Outbox;
 use crate::wire::{Message, Reply, SettingsOrigin, Status, binary};
 
 use super::command::{Command, CommandError, parse};
+use super::lock::LockError;
 use super::store::{Keep, Started};
 use super::{Key, Limits, Settings, SettingsError};
 
@@ -48,12 +49,14 @@ pub struct Board {
 /// ```
 #[derive(Clone, Debug)]
 pub struct Console {
-    settings: Settings,
+    pub(super) settings: Settings,
     origin: SettingsOrigin,
     board: Board,
     session: u32,
     refused: u32,
     fixed: bool,
+    /// When a wrong number was last tried on the lock, ms since the start.
+    pub(super) wrong_number_at_ms: Option<u64>,
 }
 
 impl Console {
@@ -77,6 +80,7 @@ impl Console {
             session: started.session,
             refused: 0,
             fixed: false,
+            wrong_number_at_ms: None,
         })
     }
 
@@ -113,11 +117,16 @@ impl Console {
         self.session
     }
 
-    /// Replaces all settings at once.
+    /// Replaces all settings at once, but for the lock, which [`Console::lock`] is for.
     ///
     /// # Errors
-    /// They do not fit together or do not fit the board; the old ones stay.
+    /// They are locked, do not fit together, or do not fit the board; the old ones stay.
     pub fn replace(&mut self, settings: Settings) -> Result<(), SettingsError> {
+        if self.is_locked() {
+            return Err(SettingsError::Locked);
+        }
+        let lock = None;
+        let settings = Settings { lock, ..settings };
         settings.check(&self.board.limits)?;
         if settings != self.settings {
             self.settings = settings;
@@ -185,6 +194,29 @@ impl Console {
             Command::Set(_) | Command::Save | Command::Defaults if self.fixed => {
                 return Err(CommandError::Fixed);
             }
+            Command::Lock(Some(_)) | Command::Unlock(_) if self.fixed => {
+                return Err(CommandError::Fixed);
+            }
+            Command::Set(_) | Command::Save | Command::Defaults if self.is_locked() => {
+                return Err(CommandError::Lock(LockError::Locked));
+            }
+            Command::Lock(None) => {
+                let state = if self.is_locked() {
+                    "locked"
+                } else {
+                    "not locked"
+                };
+                reply(true, format_args!("{state}"))
+            }
+            Command::Lock(Some(number)) => {
+                self.lock(number, store).map_err(CommandError::Lock)?;
+                reply(true, format_args!("locked"))
+            }
+            Command::Unlock(number) => {
+                let unlocked = self.unlock(number, uptime_ms, store);
+                unlocked.map_err(CommandError::Lock)?;
+                reply(true, format_args!("unlocked"))
+            }
             Command::Version => {
                 let [major, minor, patch] = self.board.version;
                 let format = binary::FORMAT;
@@ -219,7 +251,7 @@ impl Console {
             Command::Help => reply(
                 true,
                 format_args!(
-                    "version, status, get [KEY], set KEY VALUE ..., save, defaults, resend N [M], help"
+                    "version, status, get [KEY], set KEY VALUE ..., save, defaults, resend N [M], lock [N], unlock N, help"
                 ),
             ),
         };

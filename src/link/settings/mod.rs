@@ -9,6 +9,7 @@ mod check;
 pub mod command;
 mod console;
 mod key;
+mod lock;
 mod real;
 pub mod store;
 
@@ -17,6 +18,7 @@ use serde::{Deserialize, Serialize};
 pub use check::{Limits, SettingsError};
 pub use console::{Board, Console};
 pub use key::{Key, ValueError};
+pub use lock::LockError;
 
 /// A part of the picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -76,6 +78,8 @@ pub struct Settings {
     pub wire: Wire,
     /// Address as a Modbus server, 1 to 247.
     pub unit: u8,
+    /// The number that unlocks the settings, where they are locked ([`Console::lock`]).
+    pub lock: Option<u32>,
 }
 
 impl Settings {
@@ -91,6 +95,7 @@ impl Settings {
         max_hz: None,
         wire: Wire::Text,
         unit: 1,
+        lock: None,
     };
 }
 

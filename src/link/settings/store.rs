@@ -21,7 +21,9 @@ use crate::wire::{CRC_32, SettingsOrigin};
 pub const SLOT_LEN: usize = 256;
 
 /// `RTS`, and the version of the content.
-const MAGIC: [u8; 4] = *b"RTS\x01";
+const MAGIC: [u8; 4] = *b"RTS\x02";
+/// The version before it, which is read: its settings end before the lock.
+const MAGIC_1: [u8; 4] = *b"RTS\x01";
 
 /// Why settings could not be kept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -285,14 +287,28 @@ fn decode(bytes: &[u8; SLOT_LEN]) -> Option<Slot> {
     let length = usize::from(u16::from_le_bytes(*length));
     let end = length.checked_add(10)?;
     let sum = bytes.get(end..)?.first_chunk::<4>()?;
-    if *magic != MAGIC || CRC_32.checksum(bytes.get(..end)?) != u32::from_le_bytes(*sum) {
+    if CRC_32.checksum(bytes.get(..end)?) != u32::from_le_bytes(*sum) {
         return None;
     }
-    match postcard::take_from_bytes(content.get(..length)?) {
-        Ok((record, [])) => Some(Slot::Valid {
-            number: u32::from_le_bytes(*number),
-            record,
-        }),
+    let content = content.get(..length)?;
+    let record = match *magic {
+        MAGIC => whole(content)?,
+        MAGIC_1 => {
+            // Without settings there is no lock to be missed; with settings it is none.
+            let mut longer = [0; SLOT_LEN];
+            longer.get_mut(..length)?.copy_from_slice(content);
+            whole(content).or_else(|| whole(longer.get(..=length)?))?
+        }
+        _ => return None,
+    };
+    let number = u32::from_le_bytes(*number);
+    Some(Slot::Valid { number, record })
+}
+
+/// A record that takes all of the bytes.
+fn whole(bytes: &[u8]) -> Option<Record> {
+    match postcard::take_from_bytes(bytes) {
+        Ok((record, [])) => Some(record),
         _ => None,
     }
 }

@@ -25,6 +25,7 @@ use super::MAX_FRAME;
 pub struct FrameReader {
     frame: Vec<u8, MAX_FRAME>,
     too_long: bool,
+    first_us: u64,
     last_us: u64,
     silence_us: u64,
     /// Length of a character.
@@ -42,6 +43,7 @@ impl FrameReader {
         Self {
             frame: Vec::new(),
             too_long: false,
+            first_us: 0,
             last_us: 0,
             silence_us,
             character_us: 11_000_000 / baud,
@@ -55,6 +57,9 @@ impl FrameReader {
         if self.silent(now_us.saturating_sub(self.character_us)) {
             self.clear();
         }
+        if self.frame.is_empty() {
+            self.first_us = now_us;
+        }
         self.last_us = now_us;
         self.too_long |= self.frame.push(byte).is_err();
     }
@@ -64,6 +69,18 @@ impl FrameReader {
     pub fn frame(&self, now_us: u64) -> Option<&[u8]> {
         let done = !self.frame.is_empty() && !self.too_long && self.silent(now_us);
         done.then_some(self.frame.as_slice())
+    }
+
+    /// When the frame's first byte came, µs.
+    pub(crate) fn began_us(&self) -> u64 {
+        self.first_us
+    }
+
+    /// How long a frame of so many bytes takes, with the silence behind it, µs.
+    pub(crate) fn duration_us(&self, bytes: usize) -> u64 {
+        (bytes as u64)
+            .saturating_mul(self.character_us)
+            .saturating_add(self.silence_us)
     }
 
     /// Forgets what came so far.
