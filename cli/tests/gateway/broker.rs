@@ -1,12 +1,11 @@
 //! A real mosquitto on loopback, and a client of it.
 
+use std::io::{BufRead, BufReader, Write};
 use std::net::{TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
-
-use rumqttc::{Client, Event, MqttOptions, Packet, QoS};
 
 /// A mosquitto that ends with the test.
 pub(crate) struct Broker {
@@ -16,8 +15,16 @@ pub(crate) struct Broker {
 }
 
 impl Broker {
-    /// `None` where there is no mosquitto.
+    /// `None` where there is no mosquitto, or none of its clients.
     pub(crate) fn start(dir: &Path, more: &str) -> Option<Self> {
+        if Command::new("mosquitto_sub")
+            .arg("--help")
+            .output()
+            .is_err()
+        {
+            eprintln!("left out: no mosquitto_sub; apt-get install mosquitto mosquitto-clients");
+            return None;
+        }
         let port = TcpListener::bind("127.0.0.1:0")
             .unwrap()
             .local_addr()
@@ -53,7 +60,7 @@ impl Broker {
             }
             return true;
         }
-        eprintln!("left out: there is no mosquitto; apt-get install mosquitto");
+        eprintln!("left out: no mosquitto; apt-get install mosquitto mosquitto-clients");
         false
     }
 
@@ -86,36 +93,75 @@ impl Drop for Broker {
     }
 }
 
+/// A `mosquitto_sub` that ends with the test.
+pub(crate) struct Listener(Child);
+
+impl Drop for Listener {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// What a listener hears when it is there.
+const READY: &[u8] = b"ready";
+
 /// The messages on a topic, heard by a client with a lasting session that subscribes anew whenever it
 /// is back: a broker that was killed may have forgotten it.
-pub(crate) fn subscribe(port: u16, topic: &'static str) -> (Client, Receiver<(String, Vec<u8>)>) {
+pub(crate) fn subscribe(port: u16, topic: &str) -> (Listener, Receiver<(String, Vec<u8>)>) {
     let (to, heard) = channel();
-    let mut options = MqttOptions::new("receiver", "127.0.0.1", port);
-    options
-        .set_clean_session(false)
-        .set_keep_alive(Duration::from_secs(5));
-    let (client, mut connection) = Client::new(options, 10);
+    let address = ["-h", "127.0.0.1", "-p", &port.to_string()].map(str::to_owned);
+    let mut child = Command::new("mosquitto_sub")
+        .args(&address)
+        .args([
+            "-i", "receiver", "-c", "-q", "1", "-k", "5", "-F", "%t %x", "-t", topic,
+        ])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("apt-get install mosquitto-clients");
+    let lines = BufReader::new(child.stdout.take().unwrap()).lines();
     let (ready_to, ready) = channel();
-    let of_thread = client.clone();
     std::thread::spawn(move || {
-        for event in connection.iter() {
-            match event {
-                Ok(Event::Incoming(Packet::ConnAck(_))) => {
-                    of_thread.try_subscribe(topic, QoS::AtLeastOnce).unwrap();
-                }
-                Ok(Event::Incoming(Packet::SubAck(_))) => drop(ready_to.send(())),
-                Ok(Event::Incoming(Packet::Publish(message))) => {
-                    if to.send((message.topic, message.payload.to_vec())).is_err() {
-                        return;
-                    }
-                }
-                Ok(_) => {}
-                Err(_) => std::thread::sleep(Duration::from_millis(100)),
+        for line in lines.map_while(Result::ok) {
+            let (topic, digits) = line.split_once(' ').unwrap();
+            let byte = |pair: &[u8]| u8::from_str_radix(std::str::from_utf8(pair).unwrap(), 16);
+            let message: Vec<u8> = digits
+                .as_bytes()
+                .chunks(2)
+                .map(|d| byte(d).unwrap())
+                .collect();
+            if message == READY {
+                let _ = ready_to.send(());
+            } else if to.send((topic.to_owned(), message)).is_err() {
+                return;
             }
         }
     });
-    ready
-        .recv_timeout(Duration::from_secs(20))
-        .expect("a subscription");
-    (client, heard)
+    let start = Instant::now();
+    loop {
+        publish(port, &topic.replace(['+', '#'], "ready"), READY);
+        if ready.recv_timeout(Duration::from_millis(200)).is_ok() {
+            return (Listener(child), heard);
+        }
+        assert!(start.elapsed().as_secs() < 20, "no subscription");
+    }
+}
+
+/// Publishes one message, with `mosquitto_pub`.
+pub(crate) fn publish(port: u16, topic: &str, message: &[u8]) {
+    publish_with(port, topic, message, &[]);
+}
+
+/// The same, with more options.
+pub(crate) fn publish_with(port: u16, topic: &str, message: &[u8], more: &[&str]) {
+    let mut child = Command::new("mosquitto_pub")
+        .args(["-h", "127.0.0.1", "-p", &port.to_string()])
+        .args(["-q", "1", "-s", "-t", topic])
+        .args(more)
+        .stdin(Stdio::piped())
+        .spawn()
+        .expect("apt-get install mosquitto-clients");
+    child.stdin.take().unwrap().write_all(message).unwrap();
+    assert!(child.wait().unwrap().success());
 }

@@ -1,10 +1,12 @@
 //! The gateway against a real mosquitto on loopback, its boards on pseudo-terminals.
 //!
-//! Left out, and said so, where there is no mosquitto (Debian: `apt-get install mosquitto`).
+//! Left out, and said so, where there is no mosquitto (Debian: `apt-get install mosquitto
+//! mosquitto-clients`).
 //! The load, 200 boards, and ten kills of the broker in a row:
 //! `cargo test --release -p rowtone-cli --test gateway -- --ignored --nocapture`
 #![cfg(unix)]
 
+mod attacks;
 #[path = "../common/board.rs"]
 mod board;
 mod broker;
@@ -106,13 +108,41 @@ fn collect(
 }
 
 fn run(config: &Path, more: &[&str]) -> Gateway {
+    run_into(config, more, Stdio::null())
+}
+
+fn run_into(config: &Path, more: &[&str], stderr: Stdio) -> Gateway {
     let mut command = rowtone(&["gateway", "--config"]);
     Gateway(
         command
             .arg(config)
             .args(more)
-            .stderr(Stdio::null())
+            .stderr(stderr)
             .spawn()
             .unwrap(),
     )
+}
+
+/// The same, and where what it says is to be found.
+fn run_logged(config: &Path, more: &[&str]) -> (Gateway, PathBuf) {
+    let path = config.with_extension("log");
+    let log = std::fs::File::options()
+        .append(true)
+        .create(true)
+        .open(&path)
+        .unwrap();
+    (run_into(config, more, log.into()), path)
+}
+
+/// Waits until the log says this.
+fn wait_for(log: &Path, what: &str, within: Duration) {
+    let start = Instant::now();
+    loop {
+        let said = std::fs::read_to_string(log).unwrap();
+        if said.contains(what) {
+            return;
+        }
+        assert!(start.elapsed() < within, "no {what:?} in\n{said}");
+        std::thread::sleep(Duration::from_millis(50));
+    }
 }

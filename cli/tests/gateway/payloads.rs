@@ -6,10 +6,8 @@ use std::process::{Command, Stdio};
 use std::sync::mpsc::Receiver;
 use std::time::Duration;
 
-use rumqttc::QoS;
-
 use crate::board::line;
-use crate::broker::{Broker, subscribe};
+use crate::broker::{Broker, publish, subscribe};
 use crate::{JSON, config, dir, ports, rowtone, run};
 
 /// Runs a program with these arguments in a directory; whether it did its work.
@@ -195,7 +193,7 @@ fn sparkplug() {
     let Some(broker) = Broker::start(&dir, "allow_anonymous true") else {
         return;
     };
-    let (client, heard) = subscribe(broker.port, "spBv1.0/#");
+    let (_client, heard) = subscribe(broker.port, "spBv1.0/#");
     let sparkplug = "format = \"sparkplug\"\ngroup = \"plant\"\nnode = \"hall-2\"";
     let (mut masters, slaves, names) = ports(2);
     let settings = format!("port = {}", broker.port);
@@ -234,9 +232,7 @@ fn sparkplug() {
     let metric = [&[0x0a, name.len() as u8], &name[..], &[0x20, 11, 0x70, 1]].concat();
     let command = [&[0x12, metric.len() as u8], &metric[..]].concat();
     let to = "spBv1.0/plant/NCMD/hall-2";
-    client
-        .publish(to, QoS::AtLeastOnce, false, command)
-        .unwrap();
+    publish(broker.port, to, &command);
     assert_eq!(next(&heard).0, to);
     assert_eq!(
         value(&expect("NBIRTH/hall-2", Some(0)), "bdSeq"),

@@ -6,6 +6,8 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 use toml::Spanned;
 
+use super::mqtt::packet::is_topic;
+use super::spool::record::MAX_NAME;
 use rowtone_failure::Failure;
 use rowtone_serial::port::PortName;
 
@@ -123,15 +125,23 @@ impl Config {
         };
         let file: File = toml::from_str(text).map_err(|error| {
             let at = error.span().map_or(text.len(), |span| span.start);
-            format!("{}: {}{}", line(at), key_before(text, at), error.message())
+            let message = match error.message() {
+                "missing field `board`" => "name at least one board, as [[board]]",
+                message => message,
+            };
+            format!("{}: {}{message}", line(at), key_before(text, at))
         })?;
         let wrong = |at: usize, key: &str, why: &str| Err(format!("{}: {key}: {why}", line(at)));
 
         let at = file.payload.span().start;
-        let plain = |part: &str| !part.is_empty() && !part.contains(['#', '+', '\0']);
+        let plain = |part: &str| is_topic(part) && !part.starts_with('$');
         match file.payload.get_ref() {
             Payload::Json { topic } if !plain(topic) => {
-                return wrong(at, "payload.topic", "give a topic without # and +");
+                return wrong(
+                    at,
+                    "payload.topic",
+                    "give a topic without #, + and line ends, that does not start with $",
+                );
             }
             Payload::Sparkplug { group, node }
                 if !plain(group) || !plain(node) || group.contains('/') || node.contains('/') =>
@@ -139,10 +149,18 @@ impl Config {
                 return wrong(
                     at,
                     "payload.group, payload.node",
-                    "give names without #, + and /",
+                    "give names without #, +, / and line ends, that do not start with $",
                 );
             }
             _ => {}
+        }
+        if !is_topic(&file.broker.client_id) {
+            let at = text.find("client_id").unwrap_or(0);
+            return wrong(
+                at,
+                "broker.client_id",
+                "give a name without #, + and line ends: it becomes part of a topic",
+            );
         }
         if file.spool.get_ref().max_mb == 0 {
             return wrong(file.spool.span().start, "spool.max_mb", "give at least 1");
@@ -163,12 +181,16 @@ impl Config {
         for entry in file.board.into_inner() {
             let (name_at, port_at) = (entry.name.span().start, entry.port.span().start);
             let (name, port) = (entry.name.into_inner(), entry.port.into_inner());
-            if !plain(&name) || name.contains(['/', ' ']) {
+            if !plain(&name) || name.contains(|c: char| c == '/' || c.is_whitespace()) {
                 return wrong(
                     name_at,
                     "board.name",
-                    "give a name without #, +, / and spaces",
+                    "give a name without #, +, / and spaces, that does not start with $",
                 );
+            }
+            if name.len() > MAX_NAME {
+                let why = format!("give a name of {MAX_NAME} bytes at most");
+                return wrong(name_at, "board.name", &why);
             }
             if !names.insert(name.clone()) {
                 return wrong(name_at, "board.name", &format!("{name} is there twice"));
@@ -186,12 +208,31 @@ impl Config {
             }
             boards.push(Board { name, port });
         }
-        Ok(Self {
+        let config = Self {
             broker: file.broker,
             payload: file.payload.into_inner(),
             spool: file.spool.into_inner(),
             boards,
-        })
+        };
+        match config.topics_are_short() {
+            true => Ok(config),
+            false => wrong(at, "payload", "too long: a topic has 65535 bytes at most"),
+        }
+    }
+
+    /// Whether every topic that will be made is one.
+    fn topics_are_short(&self) -> bool {
+        let longest = "x".repeat(MAX_NAME);
+        let client_id = &self.broker.client_id;
+        match &self.payload {
+            Payload::Json { topic } => {
+                is_topic(&format!("{topic}/{longest}/report"))
+                    && is_topic(&format!("{topic}/gateway/{client_id}/state"))
+            }
+            Payload::Sparkplug { group, node } => {
+                is_topic(&format!("spBv1.0/{group}/DDEATH/{node}/{longest}"))
+            }
+        }
     }
 }
 
@@ -250,6 +291,17 @@ port = "/dev/ttyUSB1"
                 "topic = \"#\"",
                 "6: payload.topic: ",
             ),
+            ("plant/vibration", "$SYS/x", "6: payload.topic: "),
+            ("plant/vibration", "a\\nb", "6: payload.topic: "),
+            (
+                "plant/vibration",
+                &"x".repeat(65_500),
+                "6: payload: too long",
+            ),
+            ("hall-2", "hall#2", "4: broker.client_id: "),
+            ("hall-2", "", "4: broker.client_id: "),
+            ("press-4", "press\\n4", "18: board.name: "),
+            ("press-4", &"x".repeat(65), "18: board.name: "),
             (
                 "press-4",
                 "press-3",

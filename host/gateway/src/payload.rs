@@ -1,6 +1,6 @@
 //! A report as a JSON message.
 
-use super::entry::Entry;
+use super::spool::record::Entry;
 use rowtone_report::json;
 
 /// The object that `rowtone analyze` writes, with whose it is, its session, and when it came.

@@ -4,7 +4,7 @@
 use prost::{Message, Oneof};
 use rowtone::report::{MAX_PEAKS, Report};
 
-use super::entry::Entry;
+use super::spool::record::Entry;
 use rowtone_report::band_velocity;
 
 /// `org.eclipse.tahu.protobuf.Payload`

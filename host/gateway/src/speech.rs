@@ -2,21 +2,13 @@
 
 use std::collections::BTreeSet;
 
-use super::broker::Will;
 use super::config::{Config, Payload};
-use super::entry::Entry;
+use super::mqtt::packet::Message;
+use super::spool::record::Entry;
 use super::{payload, sparkplug};
 
 /// Older reports are marked as historical (Sparkplug).
 const HISTORICAL_MS: u64 = 10_000;
-
-/// One message to publish.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Said {
-    pub(super) topic: String,
-    pub(super) payload: Vec<u8>,
-    pub(super) retain: bool,
-}
 
 /// Knows what was said on this connection.
 #[derive(Debug)]
@@ -43,15 +35,10 @@ impl Speech {
     }
 
     /// A new connection begins: what the broker is to say when the gateway dies.
-    pub(super) fn begin(&mut self, connection: u64) -> Will {
+    pub(super) fn begin(&mut self, connection: u64) -> Message {
         self.connection = connection;
         self.births.clear();
-        let last = self.goodbye();
-        Will {
-            topic: last.topic,
-            payload: last.payload,
-            retain: last.retain,
-        }
+        self.goodbye()
     }
 
     /// What the gateway wants to hear.
@@ -63,7 +50,7 @@ impl Speech {
     }
 
     /// The first message of a connection, and what a host gets that asks for births.
-    pub(super) fn hello(&mut self, unix_ms: u64) -> Said {
+    pub(super) fn hello(&mut self, unix_ms: u64) -> Message {
         self.births.clear();
         self.seq = 0;
         match &self.payload {
@@ -76,7 +63,7 @@ impl Speech {
     }
 
     /// The last one. The will is for a gateway that dies; one that ends says so itself.
-    pub(super) fn goodbye(&self) -> Said {
+    pub(super) fn goodbye(&self) -> Message {
         match &self.payload {
             Payload::Json { topic } => self.state(topic, "offline"),
             Payload::Sparkplug { .. } => {
@@ -86,9 +73,9 @@ impl Speech {
     }
 
     /// A report, after the board's birth where it needs one.
-    pub(super) fn report(&mut self, entry: &Entry, unix_ms: u64) -> (Option<Said>, Said) {
+    pub(super) fn report(&mut self, entry: &Entry, unix_ms: u64) -> (Option<Message>, Message) {
         if let Payload::Json { topic } = &self.payload {
-            let said = Said {
+            let said = Message {
                 topic: format!("{topic}/{}/report", entry.board),
                 payload: payload::json(entry),
                 retain: false,
@@ -106,7 +93,7 @@ impl Speech {
     }
 
     /// The board's line has gone and all its reports are said.
-    pub(super) fn board_gone(&mut self, board: &str, unix_ms: u64) -> Option<Said> {
+    pub(super) fn board_gone(&mut self, board: &str, unix_ms: u64) -> Option<Message> {
         // Only Sparkplug has births, and a board that was never born does not die.
         self.births.remove(board).then(|| {
             let payload = sparkplug::board_death(self.next_seq(), unix_ms);
@@ -119,28 +106,28 @@ impl Speech {
         self.seq
     }
 
-    fn state(&self, topic: &str, state: &str) -> Said {
-        Said {
+    fn state(&self, topic: &str, state: &str) -> Message {
+        Message {
             topic: format!("{topic}/gateway/{}/state", self.client_id),
             payload: state.as_bytes().to_vec(),
             retain: true,
         }
     }
 
-    fn node(&self, kind: &str, payload: Vec<u8>) -> Said {
+    fn node(&self, kind: &str, payload: Vec<u8>) -> Message {
         self.sparkplug(kind, "", payload)
     }
 
-    fn board(&self, kind: &str, board: &str, payload: Vec<u8>) -> Said {
+    fn board(&self, kind: &str, board: &str, payload: Vec<u8>) -> Message {
         self.sparkplug(kind, &format!("/{board}"), payload)
     }
 
-    fn sparkplug(&self, kind: &str, board: &str, payload: Vec<u8>) -> Said {
+    fn sparkplug(&self, kind: &str, board: &str, payload: Vec<u8>) -> Message {
         let topic = match &self.payload {
             Payload::Sparkplug { group, node } => format!("spBv1.0/{group}/{kind}/{node}{board}"),
             Payload::Json { topic } => topic.clone(),
         };
-        Said {
+        Message {
             topic,
             payload,
             retain: false,
