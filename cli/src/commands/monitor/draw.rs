@@ -1,5 +1,7 @@
 //! The live view drawn: peaks with bars and trends, a waterfall, and what was lost.
 
+use std::time::Instant;
+
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::style::{Color, Style, Stylize};
@@ -8,7 +10,7 @@ use ratatui::widgets::{Block, Paragraph};
 use rowtone::report::{Peak, Report};
 
 use super::history::{History, TREND};
-use super::screen::View;
+use super::screen::{Age, View};
 use rowtone_report::{band_velocity, sentence, text::digits, velocity_mm_s_rms};
 
 /// Columns of a peak's numbers, and of what is noted behind its trend.
@@ -39,11 +41,16 @@ pub(super) fn draw(frame: &mut Frame<'_>, view: &View<'_>) {
 }
 
 fn top<'a>(view: &'a View<'_>) -> Vec<Line<'a>> {
-    let state = match &view.gone {
-        None => "connected".green(),
-        Some(why) => format!("away: {why}").red(),
+    let age = view.age(Instant::now());
+    let state = match (&view.gone, age) {
+        (Some(why), _) => format!("away: {why}").red(),
+        (None, Some(Age::Silent(age))) => format!("silent for {} s", age.as_secs()).red().bold(),
+        (None, _) => "connected".green(),
     };
     let mut first = vec!["rowtone ".bold(), view.port.into(), "  ".into(), state];
+    if let (Some(Age::Fresh(age)), Some(_)) = (age, view.heard) {
+        first.push(format!("  last report {} s ago", age.as_secs()).into());
+    }
     let Some(report) = view.history.reports.front() else {
         return vec![Line::from(first)];
     };

@@ -5,6 +5,7 @@ mod history;
 mod log;
 mod plain;
 mod screen;
+mod signals;
 
 use std::io::IsTerminal;
 use std::path::PathBuf;

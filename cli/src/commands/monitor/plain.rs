@@ -25,7 +25,7 @@ pub(super) fn run(
     let mut out = Out::default();
     for event in events {
         match event {
-            Event::Open => {}
+            Event::Open => board.set_line(true),
             Event::Bytes(bytes) => {
                 let mut heard = vec![];
                 board.hear(&bytes, |one| heard.push(one));
@@ -48,7 +48,10 @@ pub(super) fn run(
             Event::Gone(why) if once => {
                 return Err(went_away(port, board.counters().reports, &why));
             }
-            Event::Gone(why) => eprintln!("rowtone: the line went away ({why}); waiting for it"),
+            Event::Gone(why) => {
+                board.set_line(false);
+                eprintln!("rowtone: the line went away ({why}); waiting for it");
+            }
             Event::End => break,
         }
     }

@@ -10,6 +10,7 @@ use rowtone::wire::Arrival;
 use super::draw::draw;
 use super::history::History;
 use super::log::Log;
+use super::signals::Signals;
 use super::went_away;
 use rowtone_failure::Failure;
 use rowtone_serial::line::Event;
@@ -17,6 +18,11 @@ use rowtone_serial::receiver::{Heard, Receiver as Board};
 
 /// The screen is drawn this often at the most.
 const FRAME: Duration = Duration::from_millis(100);
+
+/// A board is silent when nothing has come for so many times as its last two reports were apart, and
+/// for so long at the least.
+const MISSED: u32 = 3;
+const SILENCE: Duration = Duration::from_secs(5);
 
 /// All that is shown.
 pub(super) struct View<'a> {
@@ -30,6 +36,19 @@ pub(super) struct View<'a> {
     pub(super) session: u32,
     pub(super) history: History,
     pub(super) board: Board,
+    /// When the newest report came.
+    pub(super) heard: Option<Instant>,
+    /// When the port was opened.
+    open: Option<Instant>,
+}
+
+/// How long it is since the board was heard.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Age {
+    /// As long as is to be expected.
+    Fresh(Duration),
+    /// Longer.
+    Silent(Duration),
 }
 
 pub(super) fn run(
@@ -49,9 +68,13 @@ pub(super) fn run(
         session: 0,
         history: History::default(),
         board: Board::default(),
+        heard: None,
+        open: None,
     };
-    let done = view.follow(&mut terminal, events, commands, log);
+    let signals = Signals::catch();
+    let done = view.follow(&mut terminal, events, commands, log, &signals);
     ratatui::restore();
+    signals.pass_on();
     done
 }
 
@@ -62,9 +85,19 @@ impl View<'_> {
         events: &Receiver<Event>,
         commands: &Sender<Vec<u8>>,
         mut log: Option<Log>,
+        signals: &Signals,
     ) -> Result<(), Failure> {
         let failed = |error| Failure::writing("terminal", &error);
         loop {
+            if signals.is_to_end() {
+                return Ok(());
+            }
+            if signals.is_to_pause() {
+                ratatui::restore();
+                signals.pause();
+                *terminal = ratatui::try_init().map_err(failed)?;
+                terminal.clear().map_err(failed)?;
+            }
             terminal.draw(|frame| draw(frame, self)).map_err(failed)?;
             let next = Instant::now() + FRAME;
             loop {
@@ -95,11 +128,18 @@ impl View<'_> {
 
     fn take(&mut self, event: Event, mut log: Option<&mut Log>) -> Result<(), Failure> {
         match event {
-            Event::Open => self.gone = None,
+            Event::Open => {
+                self.gone = None;
+                self.open = Some(Instant::now());
+                self.board.set_line(true);
+            }
             Event::Gone(why) if self.once => {
                 return Err(went_away(self.port, self.board.counters().reports, &why));
             }
-            Event::Gone(why) => self.gone = Some(why),
+            Event::Gone(why) => {
+                self.gone = Some(why);
+                self.board.set_line(false);
+            }
             Event::End => self.gone = Some("the input has ended".to_owned()),
             Event::Bytes(bytes) => {
                 let mut heard = vec![];
@@ -139,7 +179,24 @@ impl View<'_> {
             _ => {}
         }
         self.session = session;
+        self.heard = Some(Instant::now());
         self.history.push(report);
+    }
+
+    /// How long ago the board was heard; none where neither it nor its line ever was.
+    pub(super) fn age(&self, now: Instant) -> Option<Age> {
+        let mut newest = self.history.reports.iter().map(|report| report.time_ms);
+        let apart_ms = match (newest.next(), newest.next()) {
+            (Some(last), Some(before)) => last.saturating_sub(before),
+            _ => 0,
+        };
+        // A gap in the reports is not how far apart they are.
+        let apart = Duration::from_millis(apart_ms.min(60_000));
+        let age = now.saturating_duration_since(self.heard.or(self.open)?);
+        Some(match age > (apart * MISSED).max(SILENCE) {
+            true => Age::Silent(age),
+            false => Age::Fresh(age),
+        })
     }
 }
 
@@ -164,6 +221,8 @@ mod tests {
             session: 0,
             history: History::default(),
             board: Board::default(),
+            heard: None,
+            open: None,
         }
     }
 
@@ -234,5 +293,34 @@ mod tests {
             long >= 8 * 12 && short == long / 4,
             "{long} {short}\n{screen}"
         );
+    }
+
+    #[test]
+    fn a_board_that_falls_silent_is_said_to_be() {
+        let mut view = view();
+        let start = Instant::now();
+        let at = |s| start + Duration::from_secs(s);
+        assert_eq!(view.age(at(99)), None);
+        view.open = Some(start);
+        assert!(matches!(view.age(at(4)), Some(Age::Fresh(_))));
+        assert!(
+            matches!(view.age(at(6)), Some(Age::Silent(_))),
+            "never heard"
+        );
+        for seq in 0..2_u32 {
+            let mut report = rowtone_report::example(None);
+            (report.seq, report.time_ms) = (seq, 4000 * u64::from(seq));
+            hear(&mut view, report);
+        }
+        view.heard = Some(start);
+        // Reports are 4 s apart.
+        assert!(matches!(view.age(at(11)), Some(Age::Fresh(_))));
+        assert_eq!(view.age(at(13)), Some(Age::Silent(Duration::from_secs(13))));
+        let shown = screen(&view, 100, 24);
+        assert!(shown.contains("last report 0 s ago"), "{shown}");
+        view.heard = Instant::now().checked_sub(Duration::from_secs(20));
+        let shown = screen(&view, 100, 24);
+        assert!(shown.contains("silent for 20 s"), "{shown}");
+        assert!(!shown.contains("connected"), "{shown}");
     }
 }
