@@ -17,6 +17,7 @@
 //!
 //! Everything but [`capture`]'s libcamera part (feature `libcamera`) builds and is tested anywhere.
 
+pub mod alive;
 pub mod backoff;
 pub mod capture;
 pub mod clock;

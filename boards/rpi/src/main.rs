@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
 
 use clap::{Parser, Subcommand};
 use rowtone_rpi::capture::simulated::{Scene, Simulated};
@@ -133,7 +134,11 @@ fn measure(cli: &Cli, config: &Config) -> ExitCode {
     let shared = Shared::new(config.settings);
     let asked = Arc::new(AtomicBool::new(false));
     for signal in [signal_hook::consts::SIGTERM, signal_hook::consts::SIGINT] {
-        if let Err(e) = signal_hook::flag::register(signal, asked.clone()) {
+        // Asked a second time it ends at once, whatever it is doing.
+        let at_once =
+            signal_hook::flag::register_conditional_shutdown(signal, 1, Arc::clone(&asked));
+        let caught = at_once.and_then(|_| signal_hook::flag::register(signal, asked.clone()));
+        if let Err(e) = caught {
             log(&format!("signal {signal} cannot be caught: {e}"));
         }
     }
@@ -148,17 +153,10 @@ fn measure(cli: &Cli, config: &Config) -> ExitCode {
     let done = AtomicBool::new(false);
     let outcome = std::thread::scope(|scope| {
         let (shared, asked, done) = (&shared, &asked, &done);
-        scope.spawn(move || {
-            while !done.load(Ordering::Relaxed) {
-                if asked.load(Ordering::Relaxed) {
-                    shared.stop.store(true, Ordering::Relaxed);
-                }
-                std::thread::sleep(std::time::Duration::from_millis(20));
-            }
-        });
-        let outcome = run::run(config, shared, &mut open);
-        done.store(true, Ordering::Relaxed);
-        outcome
+        scope.spawn(move || watch(shared, asked, done));
+        // Also where it panics: the scope would wait for ever.
+        let _done = Done(done);
+        run::run(config, shared, &mut open)
     });
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
@@ -167,6 +165,38 @@ fn measure(cli: &Cli, config: &Config) -> ExitCode {
             ExitCode::from(2)
         }
     }
+}
+
+/// Set when this is dropped.
+struct Done<'a>(&'a AtomicBool);
+
+impl Drop for Done<'_> {
+    fn drop(&mut self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+}
+
+/// How long an end in order may take: less than systemd waits (`TimeoutStopSec`).
+const LAST_WORDS: Duration = Duration::from_secs(8);
+
+/// The thread that waits for signals, until `done`.
+fn watch(shared: &Shared, asked: &AtomicBool, done: &AtomicBool) {
+    let mut stopping: Option<Instant> = None;
+    while !done.load(Ordering::Relaxed) {
+        shared.pulses.signals.beat(shared.started);
+        if asked.load(Ordering::Relaxed) {
+            shared.stop.store(true, Ordering::Relaxed);
+        }
+        if shared.is_stopping() {
+            let since = *stopping.get_or_insert_with(Instant::now);
+            if since.elapsed() >= LAST_WORDS {
+                log("it does not end in order; it ends now");
+                std::process::exit(1);
+            }
+        }
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    shared.pulses.signals.rest();
 }
 
 type Opener = Box<dyn FnMut(&Config) -> Result<Box<dyn Source>, CameraError>>;

@@ -1,5 +1,6 @@
 //! The program as a service: measures for ever, opens the camera anew when it fails, ends cleanly.
 
+use std::io::Write;
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::{SyncSender, sync_channel};
 use std::time::Duration;
@@ -11,6 +12,7 @@ use rowtone::link::settings::{Board, Console, Limits, Settings, SettingsError};
 use rowtone::report::Report;
 use rowtone::wire::SettingsOrigin;
 
+use crate::alive::Alive;
 use crate::backoff::Backoff;
 use crate::capture::{CameraError, Source};
 use crate::config::Config;
@@ -51,19 +53,30 @@ impl Keeper {
     fn open(config: &Config) -> (Self, Started) {
         let path = &config.service.state;
         let store = FileFlash::open(path)
+            .map(|flash| (flash, None))
+            .or_else(|e| FileFlash::open_read_only(path).map(|flash| (flash, Some(e))))
             .map_err(|e| e.to_string())
-            .and_then(|flash| Store::new(flash, 0).map_err(|e| e.to_string()));
+            .and_then(|(flash, read_only)| {
+                let store = Store::new(flash, 0).map_err(|e| e.to_string())?;
+                Ok((store, read_only))
+            });
         match store {
-            Ok(mut store) => {
-                let started = store.start();
+            Ok((mut store, read_only)) => {
+                let mut started = store.start();
+                if let Some(e) = read_only {
+                    log(&format!(
+                        "{}: settings are read and cannot be kept: {e}",
+                        path.display()
+                    ));
+                    // The start could not be counted.
+                    started.session = session_by_time();
+                }
                 (Self::File(store), started)
             }
             Err(e) => {
                 log(&format!("{}: settings cannot be kept: {e}", path.display()));
-                let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
                 let started = Started {
-                    // Any number that differs from run to run.
-                    session: now.map_or(1, |t| t.as_secs() as u32),
+                    session: session_by_time(),
                     settings: None,
                     origin: SettingsOrigin::Defaults,
                 };
@@ -73,10 +86,16 @@ impl Keeper {
     }
 }
 
-/// One line for the journal.
+/// A number that differs from run to run.
+fn session_by_time() -> u32 {
+    let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
+    now.map_or(1, |t| t.as_secs() as u32)
+}
+
+/// One line for the journal. Where nobody reads it any more it is lost, and that is no reason to end.
 pub fn log(text: &str) {
     for line in text.lines() {
-        eprintln!("rowtone-rpi: {line}");
+        let _ = writeln!(std::io::stderr(), "rowtone-rpi: {line}");
     }
 }
 
@@ -131,6 +150,7 @@ fn measure(config: &Config, shared: &Shared, open: &mut Open<'_>, reports: SyncS
     }
     let mut backoff = Backoff::new(Duration::from_millis(500), Duration::from_secs(30));
     let mut ready = false;
+    let mut alive = Alive::new(&notifier, shared);
     while !shared.is_stopping() {
         let outcome = open(config).map(|mut source| {
             if !ready {
@@ -160,7 +180,10 @@ fn measure(config: &Config, shared: &Shared, open: &mut Open<'_>, reports: SyncS
         ));
         while !backoff.is_due() && !shared.is_stopping() {
             std::thread::sleep(Duration::from_millis(50));
-            notifier.say("WATCHDOG=1");
+            match ready {
+                true => alive.tell(),
+                false => alive.still_starting(),
+            }
         }
     }
     notifier.say("STOPPING=1");

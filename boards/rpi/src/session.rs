@@ -14,6 +14,7 @@ use rowtone::pipeline::{Collector, Reporter};
 use rowtone::report::{Report, Warnings};
 use rowtone::spectrum::FrameRatePlan;
 
+use crate::alive::{Alive, Pulses};
 use crate::capture::{CameraError, Source};
 use crate::clock::{FrameClock, FrameCounts};
 use crate::config::{Config, USUAL_HIGHEST_HZ};
@@ -34,6 +35,8 @@ pub struct Shared {
     pub settings: Mutex<Settings>,
     /// Columns and rows of the camera's picture, in the upper and the lower half; 0 until one is open.
     picture: AtomicU32,
+    /// Signs of life of the other threads.
+    pub pulses: Pulses,
     /// Windows dropped because the spectrum was busy, and reports because the queue was full.
     pub dropped: AtomicU64,
     /// When the program began.
@@ -48,6 +51,7 @@ impl Shared {
             changes: AtomicU32::new(0),
             settings: Mutex::new(settings),
             picture: AtomicU32::new(0),
+            pulses: Pulses::default(),
             dropped: AtomicU64::new(0),
             started: Instant::now(),
         }
@@ -165,7 +169,7 @@ fn lines_until_end(
     // Short waits, so that a stop is noticed soon.
     let patience = silence.min(Duration::from_millis(200));
     let mut heard = Instant::now();
-    let mut alive = Alive::new(notifier);
+    let mut alive = Alive::new(notifier, shared);
     loop {
         if shared.is_stopping() {
             return Ended::Asked;
@@ -239,30 +243,6 @@ impl FrameRates {
     }
 }
 
-/// Tells systemd now and then that lines are taken.
-struct Alive<'a> {
-    notifier: &'a Notifier,
-    every: Option<Duration>,
-    told: Instant,
-}
-
-impl<'a> Alive<'a> {
-    fn new(notifier: &'a Notifier) -> Self {
-        Self {
-            notifier,
-            every: Notifier::watchdog(),
-            told: Instant::now(),
-        }
-    }
-
-    fn tell(&mut self) {
-        if self.every.is_some_and(|every| self.told.elapsed() >= every) {
-            self.notifier.say("WATCHDOG=1");
-            self.told = Instant::now();
-        }
-    }
-}
-
 /// The line side's end of the way to the spectrum.
 struct Handover<'s, 'm> {
     reporter: &'s Mutex<Reporter<'m>>,
@@ -290,6 +270,7 @@ impl Handover<'_, '_> {
         });
         if collector.hand_over(&mut reporter) {
             drop(reporter);
+            self.shared.pulses.spectrum.expect(self.shared.started);
             let ready = Ready {
                 warnings,
                 offset_ms,
@@ -315,10 +296,12 @@ fn compute(
 ) {
     let mut first_ms = None;
     for ready in windows {
+        shared.pulses.spectrum.beat(shared.started);
         let mut report = match reporter.lock() {
             Ok(mut reporter) => reporter.report(),
-            Err(_) => return,
+            Err(_) => break,
         };
+        shared.pulses.spectrum.rest();
         report.warnings = report.warnings.union(ready.warnings);
         // The core counts from the session's first frame, a board from its own start.
         let first = *first_ms.get_or_insert(report.time_ms);
@@ -327,4 +310,5 @@ fn compute(
             shared.dropped.fetch_add(1, Ordering::Relaxed);
         }
     }
+    shared.pulses.spectrum.rest();
 }

@@ -41,6 +41,21 @@ impl FileFlash {
         Ok(flash)
     }
 
+    /// Opens a file of which nothing can be written, for what was saved in it before.
+    ///
+    /// # Errors
+    /// It is not there or shorter than it should be.
+    pub fn open_read_only(path: &Path) -> io::Result<Self> {
+        let flash = Self {
+            file: File::open(path)?,
+        };
+        let has = flash.file.metadata()?.len() as usize;
+        if has < flash.capacity() {
+            return Err(io::ErrorKind::UnexpectedEof.into());
+        }
+        Ok(flash)
+    }
+
     fn fill(&mut self, from: usize, to: usize) -> io::Result<()> {
         self.file
             .write_all_at(&vec![0xff; to.saturating_sub(from)], from as u64)?;
@@ -123,6 +138,26 @@ mod tests {
         store.save(started.session, &changed).unwrap();
         let started = open().start();
         assert_eq!((started.session, started.settings), (2, Some(changed)));
+        std::fs::remove_file(&path).unwrap();
+    }
+
+    #[test]
+    fn what_was_saved_is_read_from_a_disk_that_takes_nothing() {
+        let path = std::env::temp_dir().join(format!("rowtone-store-ro-{}", std::process::id()));
+        let _ = std::fs::remove_file(&path);
+        assert!(FileFlash::open_read_only(&path).is_err());
+        let mut store = Store::new(FileFlash::open(&path).unwrap(), 0).unwrap();
+        let session = store.start().session;
+        let changed = Settings {
+            window_s: 0.5,
+            ..Settings::default()
+        };
+        store.save(session, &changed).unwrap();
+        let flash = FileFlash::open_read_only(&path).unwrap();
+        let mut store = Store::new(flash, 0).unwrap();
+        let started = store.start();
+        assert_eq!(started.settings, Some(changed));
+        assert!(store.save(started.session, &Settings::default()).is_err());
         std::fs::remove_file(&path).unwrap();
     }
 }

@@ -14,6 +14,7 @@ use serialport::SerialPort;
 
 use crate::backoff::Backoff;
 use crate::config::OutputConfig;
+use crate::run::log;
 use crate::session::Shared;
 use crate::system;
 
@@ -96,6 +97,7 @@ impl<K: Keep> Uart<'_, K> {
         let mut ended: Option<Instant> = None;
         let mut told = false;
         loop {
+            shared.pulses.output.beat(shared.started);
             match reports.recv_timeout(STEP) {
                 Ok(report) => self.link.push(report),
                 Err(RecvTimeoutError::Timeout) => {}
@@ -112,10 +114,8 @@ impl<K: Keep> Uart<'_, K> {
                         self.link.announce(now_us(shared));
                     }
                     Err(e) if !told => {
-                        eprintln!(
-                            "rowtone-rpi: {}: cannot be opened: {e}; trying again",
-                            self.config.port
-                        );
+                        let port = &self.config.port;
+                        log(&format!("{port}: cannot be opened: {e}; trying again"));
                         told = true;
                         backoff.failed();
                     }
@@ -127,16 +127,17 @@ impl<K: Keep> Uart<'_, K> {
             let said = match port.as_mut().map(|port| self.serve(port, shared)) {
                 Some(Ok(idle)) => idle,
                 Some(Err(e)) => {
-                    eprintln!(
-                        "rowtone-rpi: {}: went away ({e}); trying again",
-                        self.config.port
-                    );
-                    port = None;
-                    backoff.failed();
                     if self.config.port == "-" {
-                        shared.stop.store(true, Ordering::Relaxed); // nobody reads any more
+                        // Nobody reads any more: there is nothing to measure for.
+                        shared.stop.store(true, Ordering::Relaxed);
+                        shared.pulses.output.rest();
+                        log(&format!("standard output: {e}"));
                         return;
                     }
+                    let name = &self.config.port;
+                    log(&format!("{name}: went away ({e}); trying again"));
+                    port = None;
+                    backoff.failed();
                     false
                 }
                 None => false,
@@ -149,6 +150,7 @@ impl<K: Keep> Uart<'_, K> {
                         std::thread::sleep(STEP);
                     }
                 }
+                shared.pulses.output.rest();
                 return;
             }
         }
@@ -190,6 +192,7 @@ impl<K: Keep> Uart<'_, K> {
         let measured = |s: Settings| Settings {
             wire: new.wire,
             unit: new.unit,
+            lock: new.lock,
             ..s
         };
         if measured(*current) != new {
