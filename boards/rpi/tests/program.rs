@@ -160,6 +160,35 @@ fn sigterm_ends_it_though_nobody_reads() {
     assert!(said.contains("$RTRPT"), "{said}");
 }
 
+/// Who read its reports and its messages has gone, as `2>&1 | head -4` has: it ends by itself.
+#[test]
+fn it_ends_when_its_reader_has_gone() {
+    let config = file(
+        "gone",
+        "[camera]\nmode = \"160x120\"\nlearn_frames = 8\n[measure]\nwindow_s = 0.2\nhop_s = 0.1\n",
+    );
+    let (mut read, write) = std::io::pipe().unwrap();
+    let child = command()
+        .args(["--simulate", "--output", "-", "--config"])
+        .arg(&config)
+        .stdout(write.try_clone().unwrap())
+        .stderr(write)
+        .spawn();
+    let mut program = Program(child.unwrap());
+    let (mut said, mut bytes) = (vec![], [0; 512]);
+    while !said.windows(6).any(|part| part == b"$RTRPT") {
+        let count = read.read(&mut bytes).unwrap();
+        assert!(count > 0, "{}", String::from_utf8_lossy(&said));
+        said.extend(&bytes[..count]);
+    }
+    drop(read);
+    let gone = Instant::now();
+    while program.0.try_wait().unwrap().is_none() {
+        assert!(gone.elapsed() < PATIENCE, "it does not end");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+}
+
 fn output(arguments: &[&str]) -> Output {
     command().args(arguments).output().unwrap()
 }

@@ -74,6 +74,8 @@ pub(super) fn run(
     let signals = Signals::catch();
     let done = view.follow(&mut terminal, events, commands, log, &signals);
     ratatui::restore();
+    // This shows the cursor again.
+    drop(terminal);
     signals.pass_on();
     done
 }
@@ -94,6 +96,7 @@ impl View<'_> {
             }
             if signals.is_to_pause() {
                 ratatui::restore();
+                let _ = terminal.show_cursor();
                 signals.pause();
                 *terminal = ratatui::try_init().map_err(failed)?;
                 terminal.clear().map_err(failed)?;
