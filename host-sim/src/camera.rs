@@ -5,15 +5,16 @@ use rand_distr::{Distribution, StandardNormal};
 use rowtone::camera::Timing;
 
 use super::config::{Config, Hand, Shadow};
-use super::defects::Pattern;
 use super::error::{SimError, check};
 use super::exposure::{Quadrature, Seen};
 use super::field::Player;
 use super::frame::{Frame, PixelBuffer};
 use super::motion::step_value;
 use super::noise::Pixels;
+use super::pattern::Pattern;
 use super::plane::SPARE_ROWS;
-use super::schedule::{Slot, slots, stream};
+use super::random::stream;
+use super::schedule::{Slot, slots};
 use super::startup;
 use super::texture::Texture;
 

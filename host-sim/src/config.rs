@@ -8,6 +8,7 @@ use super::defects::Defects;
 use super::field::Mode;
 use super::light::Light;
 use super::motion::{Motion, Step};
+use super::rect::Rect;
 use super::scene::Scene;
 
 /// The sensor and how it is driven.
@@ -71,19 +72,6 @@ impl Optics {
     pub fn blur_for_cutoff(cutoff_cycles_per_px: f64) -> f64 {
         1.0 / (std::f64::consts::TAU * cutoff_cycles_per_px)
     }
-}
-
-/// A part of the picture, px.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-pub struct Rect {
-    /// Leftmost column.
-    pub x: u32,
-    /// Topmost row.
-    pub y: u32,
-    /// Columns.
-    pub w: u32,
-    /// Rows.
-    pub h: u32,
 }
 
 /// From `t_s` on the camera runs at `fps`.

@@ -10,9 +10,9 @@ use std::f64::consts::TAU;
 
 use serde::Serialize;
 
-use super::config::Rect;
 use super::error::{SimError, check};
-use super::schedule::{stream, unit};
+use super::random::{stream, unit};
+use super::rect::Rect;
 
 /// Sines that a random vibration is made of.
 const RANDOM_SINES: usize = 400;

@@ -45,8 +45,11 @@ pub mod light;
 pub mod motion;
 pub mod noise;
 pub mod parallel;
+mod pattern;
 mod plane;
 pub mod preset;
+mod random;
+mod rect;
 pub mod scene;
 pub mod schedule;
 mod sound;
@@ -57,7 +60,7 @@ pub mod y4m;
 
 pub use camera::{Camera, RowTruth};
 pub use config::{
-    Config, Disturbances, Faults, FirstFrame, Hand, Optics, RateChange, Rect, Sensor, Shadow,
+    Config, Disturbances, Faults, FirstFrame, Hand, Optics, RateChange, Sensor, Shadow,
 };
 pub use defects::Defects;
 pub use error::SimError;
@@ -66,6 +69,7 @@ pub use frame::{Frame, PixelBuffer};
 pub use light::{Flicker, Led, Light};
 pub use motion::{Chirp, Motion, Step, Tone};
 pub use preset::Preset;
+pub use rect::Rect;
 pub use scene::Scene;
 pub use sound::Sound;
 pub use truth::Truth;

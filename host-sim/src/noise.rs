@@ -4,7 +4,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::config::Sensor;
-use super::schedule::unit;
+use super::random::unit;
 
 /// Below this many electrons their number is drawn from the Poisson distribution itself; above, from
 /// a normal one of the same mean and variance, whose skewness (0.14 here) no longer shows.
@@ -96,7 +96,7 @@ fn poisson(mean: f32, rng: &mut ChaCha8Rng) -> f32 {
 mod tests {
     use super::*;
     use crate::Config;
-    use crate::schedule::stream;
+    use crate::random::stream;
 
     /// Mean and variance follow the photon transfer curve from dark to near white. Of 100 000 pixels
     /// the variance's estimate has a relative sd of 0.45 %; 2.3 % is five of them, so a false

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use serde::Serialize;
 
 use super::error::{SimError, check};
-use super::schedule::{stream, unit};
+use super::random::{stream, unit};
 use super::texture::Strip;
 use fields::{blur_cols, blur_rows, noise, one_over_f};
 use picture::picture;

@@ -1,10 +1,9 @@
 //! When each frame starts, and which frames never arrive.
 
-use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::{RngCore, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 
 use super::config::Config;
+use super::random::{stream, unit};
 
 /// One frame's place in time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -15,18 +14,6 @@ pub struct Slot {
     pub start_ns: i64,
     /// It never arrives.
     pub lost: bool,
-}
-
-/// The random stream for `purpose` number `index`: streams do not depend on each other, so a frame
-/// can be made without those before it.
-pub(super) fn stream(seed: u64, purpose: u16, index: u32) -> ChaCha8Rng {
-    let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    rng.set_stream(u64::from(purpose) << 32 | u64::from(index));
-    rng
-}
-
-pub(super) fn unit(rng: &mut impl RngCore) -> f64 {
-    (rng.next_u64() >> 11) as f64 / (1u64 << 53) as f64
 }
 
 /// The starts of all frames. A frame never starts before the one before it has been read out.

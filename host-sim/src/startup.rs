@@ -3,7 +3,7 @@
 use rand_distr::{Distribution, StandardNormal};
 
 use super::config::{Config, FirstFrame};
-use super::schedule::{stream, unit};
+use super::random::{stream, unit};
 
 /// Puts the fault in place of the frame's values, DN.
 pub(super) fn spoil(kind: FirstFrame, config: &Config, values: &mut [f32]) {

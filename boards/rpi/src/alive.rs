@@ -3,8 +3,8 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
+use crate::journal::log;
 use crate::notify::Notifier;
-use crate::run::log;
 use crate::session::Shared;
 
 /// How much longer the start may take, each time that is said: a camera may come late, but a program

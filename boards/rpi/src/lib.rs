@@ -13,7 +13,7 @@
 //! - [`lines`]: the line path; [`session`]: it and the spectrum, from opening a camera to its end;
 //! - [`uart`]: the output thread; [`store`]: settings kept in a file;
 //! - [`run`]: the service round all that; [`doctor`]: looks at every part and says what to do;
-//! - [`notify`], [`system`], [`backoff`], [`memory`]: small helpers.
+//! - [`journal`], [`notify`], [`system`], [`backoff`], [`memory`]: small helpers.
 //!
 //! Everything but [`capture`]'s libcamera part (feature `libcamera`) builds and is tested anywhere.
 
@@ -23,6 +23,7 @@ pub mod capture;
 pub mod clock;
 pub mod config;
 pub mod doctor;
+pub mod journal;
 pub mod lines;
 pub mod memory;
 pub mod mode;

@@ -9,9 +9,9 @@ use std::time::{Duration, Instant};
 use clap::{Parser, Subcommand};
 use rowtone_rpi::capture::simulated::{Scene, Simulated};
 use rowtone_rpi::capture::{CameraError, Source};
+use rowtone_rpi::config::Wish;
 use rowtone_rpi::config::{Config, ConfigError, Replay, StreamWish};
 use rowtone_rpi::doctor;
-use rowtone_rpi::mode::Wish;
 use rowtone_rpi::run::{self, log};
 use rowtone_rpi::session::Shared;
 

@@ -6,9 +6,8 @@
 //! enough lines for the highest wanted frequency are taken.
 
 use std::fmt;
-use std::str::FromStr;
 
-use crate::config::Config;
+use crate::config::{Config, Wish};
 
 /// Lines a period of the highest frequency that are wanted at least.
 const LINES_A_PERIOD: f64 = 2.5;
@@ -35,36 +34,6 @@ impl Offer {
     /// Share of the time in which no row is read at the fastest frame rate.
     pub fn blank(&self) -> Option<f64> {
         Some((1.0 - f64::from(self.height) * self.line_time_s? * self.max_fps?).clamp(0.0, 1.0))
-    }
-}
-
-/// The mode that the user wants.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Wish {
-    /// The best one.
-    #[default]
-    Auto,
-    /// This size.
-    Size {
-        /// Columns.
-        width: u16,
-        /// Rows.
-        height: u16,
-    },
-}
-
-impl FromStr for Wish {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        if text == "auto" {
-            return Ok(Self::Auto);
-        }
-        let (width, height) = text.split_once('x').unwrap_or_default();
-        match (width.parse(), height.parse()) {
-            (Ok(width), Ok(height)) if width > 0 && height > 0 => Ok(Self::Size { width, height }),
-            _ => Err(format!("mode {text:?}: give auto, or a size as 1332x990")),
-        }
     }
 }
 
@@ -121,7 +90,8 @@ impl std::error::Error for NoMode {}
 /// Chooses among the offers.
 ///
 /// ```
-/// use rowtone_rpi::mode::{choose, Needs, Offer, Wish};
+/// use rowtone_rpi::config::Wish;
+/// use rowtone_rpi::mode::{choose, Needs, Offer};
 /// let offer = |width, height, line_time_s, max_fps| Offer {
 ///     width, height, line_time_s: Some(line_time_s), max_fps: Some(max_fps),
 /// };

@@ -1,6 +1,5 @@
 //! The program as a service: measures for ever, opens the camera anew when it fails, ends cleanly.
 
-use std::io::Write;
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::{SyncSender, sync_channel};
 use std::time::Duration;
@@ -16,6 +15,7 @@ use crate::alive::Alive;
 use crate::backoff::Backoff;
 use crate::capture::{CameraError, Source};
 use crate::config::Config;
+pub use crate::journal::log;
 use crate::notify::Notifier;
 use crate::session::{self, Ended, Shared};
 use crate::setup::Setup;
@@ -90,13 +90,6 @@ impl Keeper {
 fn session_by_time() -> u32 {
     let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
     now.map_or(1, |t| t.as_secs() as u32)
-}
-
-/// One line for the journal. Where nobody reads it any more it is lost, and that is no reason to end.
-pub fn log(text: &str) {
-    for line in text.lines() {
-        let _ = writeln!(std::io::stderr(), "rowtone-rpi: {line}");
-    }
 }
 
 /// Measures until `shared.stop`; returns when the last report is on the line.

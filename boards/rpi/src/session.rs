@@ -18,10 +18,10 @@ use crate::alive::{Alive, Pulses};
 use crate::capture::{CameraError, Source};
 use crate::clock::{FrameClock, FrameCounts};
 use crate::config::{Config, USUAL_HIGHEST_HZ};
+use crate::journal::log;
 use crate::lines::{Lines, LinesError};
 use crate::memory::{SpectrumMemory, TrackerMemory};
 use crate::notify::Notifier;
-use crate::run::log;
 use crate::setup::Setup;
 
 /// What all threads share.

@@ -14,7 +14,7 @@ use serialport::SerialPort;
 
 use crate::backoff::Backoff;
 use crate::config::OutputConfig;
-use crate::run::log;
+use crate::journal::log;
 use crate::session::Shared;
 use crate::system;
 

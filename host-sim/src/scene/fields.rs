@@ -4,7 +4,7 @@ use rand_distr::{Distribution, StandardNormal};
 use rustfft::num_complex::Complex64;
 use rustfft::{FftDirection, FftPlannerScalar};
 
-use crate::schedule::stream;
+use crate::random::stream;
 
 /// White noise of variance 1.
 pub(super) fn noise(len: usize, seed: u64) -> Vec<f32> {

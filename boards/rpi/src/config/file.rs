@@ -258,7 +258,7 @@ impl Reader<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mode::Wish;
+    use crate::config::Wish;
 
     fn refused(text: &str) -> String {
         read(text, "f.toml").unwrap_err().to_string()

@@ -4,13 +4,14 @@
 //! from here.
 
 mod file;
+mod wish;
 
 use std::fmt;
 use std::path::{Path, PathBuf};
 
 use rowtone::link::settings::Settings;
 
-use crate::mode::Wish;
+pub use wish::Wish;
 
 /// All of it.
 #[derive(Clone, Debug, PartialEq)]

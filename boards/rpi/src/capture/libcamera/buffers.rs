@@ -10,8 +10,7 @@ use libcamera::framebuffer_allocator::{FrameBuffer, FrameBufferAllocator};
 use libcamera::framebuffer_map::MemoryMappedFrameBuffer;
 use libcamera::request::Request;
 
-use super::configure::Opened;
-use super::refused;
+use super::opened::{Opened, refused};
 use crate::capture::CameraError;
 use crate::system::memory_file;
 

@@ -4,19 +4,19 @@ use std::cell::Cell;
 use std::rc::Rc;
 use std::sync::mpsc::sync_channel;
 
-use libcamera::camera::{ActiveCamera, Camera, CameraConfiguration};
+use libcamera::camera::{Camera, CameraConfiguration};
 use libcamera::control::{ControlEntry, ControlList};
 use libcamera::controls::{
     AeEnable, AfMode, AnalogueGain, AwbEnable, ExposureTime, FrameDurationLimits, LensPosition,
 };
 use libcamera::geometry::Size;
 use libcamera::pixel_format::PixelFormat;
-use libcamera::stream::{Stream, StreamRole};
+use libcamera::stream::StreamRole;
 use libcamera::utils::UniquePtr;
 
 use super::buffers::{self, BUFFERS};
+use super::opened::{Manager, Opened, refused};
 use super::running::Capture;
-use super::{Manager, refused};
 use crate::capture::{CameraError, Facts, Shape, format, v4l2};
 use crate::config::{Config, StreamWish};
 use crate::mode::{Needs, Offer, choose};
@@ -63,17 +63,6 @@ fn offer(id: &str, size: Size) -> Option<Offer> {
         line_time_s: known.map(|(_, line_time_s)| line_time_s),
         max_fps: known.map(|(m, line_time_s)| m.max_fps(line_time_s)),
     })
-}
-
-/// A camera that is set up and not started.
-pub(super) struct Opened {
-    pub(super) camera: ActiveCamera<'static>,
-    pub(super) stream: Stream,
-    pub(super) facts: Facts,
-    /// Bytes of a frame, all planes.
-    pub(super) frame_bytes: u32,
-    /// libcamera's name of the pixel format.
-    pub(super) format: String,
 }
 
 impl Opened {

@@ -2,6 +2,7 @@
 //!
 //! - this file: finds cameras, opens one, starts libcamera anew where that is the last hope;
 //! - [`configure`]: which mode and format, and the controls that keep a picture as it is;
+//! - [`opened`]: a camera that is set up;
 //! - [`buffers`]: where frames are written to;
 //! - [`running`]: the frames themselves.
 //!
@@ -11,30 +12,23 @@
 
 mod buffers;
 mod configure;
+mod opened;
 mod running;
 
 use std::cell::Cell;
-use std::io;
 use std::rc::Rc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use libcamera::camera::Camera;
 use libcamera::camera_manager::CameraManager;
 
-use self::configure::Opened;
+use self::opened::{Manager, Opened, refused};
 use super::{CameraError, Source};
 use crate::config::Config;
 use crate::mode::Offer;
 
 /// A [`Cameras`] exists.
 static TAKEN: AtomicBool = AtomicBool::new(false);
-
-fn refused(what: &str) -> impl Fn(io::Error) -> CameraError + '_ {
-    move |e| CameraError::Refused(format!("{what}: {e}"))
-}
-
-/// Keeps libcamera going; the last one to go stops it.
-type Manager = Rc<CameraManager>;
 
 /// The cameras of this machine.
 pub struct Cameras {

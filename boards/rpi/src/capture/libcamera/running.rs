@@ -20,7 +20,7 @@ use libcamera::request::{Request, RequestStatus, ReuseFlag};
 use libcamera::stream::Stream;
 
 use super::buffers::{Allocated, Owned};
-use super::{Manager, refused};
+use super::opened::{Manager, refused};
 use crate::capture::{CameraError, Facts, Frame, Source};
 
 /// See the [module](self).
