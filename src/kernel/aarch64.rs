@@ -291,6 +291,94 @@ impl<const PIXELS: usize, const BYTES: usize, const FIRST: usize> Groups<PIXELS,
     }
 }
 
+/// Both rows' products, of pixels that are whole steps: they are loaded once.
+///
+/// # Safety
+/// The processor has what `sums` needs.
+#[inline(always)]
+unsafe fn apart(
+    pixels: &[u8],
+    coefficients: &[i8],
+    second: &[i8],
+    sums: unsafe fn(&[u8], &[i8]) -> Sums,
+) -> (Sums, i64) {
+    // SAFETY: the caller vouches for it.
+    unsafe { (sums(pixels, coefficients), sums(pixels, second).product) }
+}
+
+/// As [`Groups::sums_neon`] of pixels side by side, with a second row of coefficients; all of the same length.
+#[target_feature(enable = "neon")]
+pub(super) fn both_neon(pixels: &[u8], coefficients: &[i8], second: &[i8]) -> (Sums, i64) {
+    let ((p, rest), (h, _), (g, _)) = (
+        pixels.as_chunks::<64>(),
+        coefficients.as_chunks::<64>(),
+        second.as_chunks::<64>(),
+    );
+    if !rest.is_empty() || p.len() > STEPS {
+        // SAFETY: this processor has what this function needs.
+        return unsafe {
+            apart(
+                pixels,
+                coefficients,
+                second,
+                super::spread::Bytes::sums_neon,
+            )
+        };
+    }
+    let (mut first, mut other) = ([vdupq_n_u32(0); 2], [vdupq_n_u32(0); 2]);
+    let mut plain = [vdupq_n_u16(0); 2];
+    for ((p, h), g) in p.iter().zip(h).zip(g) {
+        let (parts, _) = p.as_chunks::<16>();
+        let (h, g) = (unsigned_64(h), unsigned_64(g));
+        for k in 0..4 {
+            // SAFETY: the array is 16 bytes long and the load needs no alignment.
+            let p = unsafe { vld1q_u8(parts[k].as_ptr()) };
+            // Two products of at most 255·128 a lane stay in 16 bits.
+            let pair = vmlal_high_u8(vmull_u8(vget_low_u8(p), vget_low_u8(h[k])), p, h[k]);
+            first[k % 2] = vpadalq_u16(first[k % 2], pair);
+            let pair = vmlal_high_u8(vmull_u8(vget_low_u8(p), vget_low_u8(g[k])), p, g[k]);
+            other[k % 2] = vpadalq_u16(other[k % 2], pair);
+            plain[k % 2] = vpadalq_u8(plain[k % 2], p);
+        }
+    }
+    let pixels = u64::from(vaddlvq_u16(plain[0]) + vaddlvq_u16(plain[1]));
+    let sums = offset_off(vaddlvq_u32(vaddq_u32(first[0], first[1])), pixels);
+    let other = offset_off(vaddlvq_u32(vaddq_u32(other[0], other[1])), pixels);
+    (sums, other.product)
+}
+
+/// As [`both_neon`], with the dot-product instructions.
+#[target_feature(enable = "neon,dotprod")]
+pub(super) fn both_dot(pixels: &[u8], coefficients: &[i8], second: &[i8]) -> (Sums, i64) {
+    let ((p, rest), (h, _), (g, _)) = (
+        pixels.as_chunks::<64>(),
+        coefficients.as_chunks::<64>(),
+        second.as_chunks::<64>(),
+    );
+    if !rest.is_empty() || p.len() > STEPS_DOT {
+        // SAFETY: this processor has what this function needs.
+        return unsafe { apart(pixels, coefficients, second, super::spread::Bytes::sums_dot) };
+    }
+    let zero = [vdupq_n_u32(0); 2];
+    let (mut first, mut other, mut plain) = (zero, zero, zero);
+    let ones = vdupq_n_u8(1);
+    for ((p, h), g) in p.iter().zip(h).zip(g) {
+        let (parts, _) = p.as_chunks::<16>();
+        let (h, g) = (unsigned_64(h), unsigned_64(g));
+        for k in 0..4 {
+            // SAFETY: the array is 16 bytes long and the load needs no alignment.
+            let p = unsafe { vld1q_u8(parts[k].as_ptr()) };
+            first[k % 2] = dot(first[k % 2], p, h[k]);
+            other[k % 2] = dot(other[k % 2], p, g[k]);
+            plain[k % 2] = dot(plain[k % 2], p, ones);
+        }
+    }
+    let pixels = vaddlvq_u32(vaddq_u32(plain[0], plain[1]));
+    let sums = offset_off(vaddlvq_u32(vaddq_u32(first[0], first[1])), pixels);
+    let other = offset_off(vaddlvq_u32(vaddq_u32(other[0], other[1])), pixels);
+    (sums, other.product)
+}
+
 /// All sums; what is left of a block's steps of 16 is done in plain Rust.
 #[target_feature(enable = "neon")]
 pub(super) fn sums_u16(pixels: &[u16], coefficients: &[i8]) -> Sums {

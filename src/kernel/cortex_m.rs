@@ -30,6 +30,26 @@ pub(super) fn kept_u8(pixels: &[u8], row: &[i8]) -> LineSums {
     apart(unsafe { whole(p, h, n) })
 }
 
+/// [`kept_u8`], and Σ h'·p with a second row that is kept: the pixels are loaded and added up once.
+#[inline(always)]
+pub(super) fn kept_both_u8(pixels: &[u8], row: &[i8], second: &[i8]) -> (LineSums, i32) {
+    let n = pixels.len();
+    let (p, h, g) = (pixels.as_ptr(), row.as_ptr(), second.as_ptr());
+    let lies = (p as usize | h as usize | g as usize | n) % 4 == 0;
+    if n > KEPT_BLOCK || !lies || n != row.len() || n != second.len() {
+        let sums = kept_part_u8(pixels, row, 0);
+        return (sums, kept_part_u8(pixels, second, 0).product);
+    }
+    let mut even = 0;
+    // SAFETY: all three pointers lie at whole words and are good for n bytes, a multiple of four.
+    let both = unsafe { both(p, h, g, n, &mut even) };
+    let sums = LineSums {
+        product: both as i32,
+        pixels: even,
+    };
+    (sums, (both >> 32) as i32)
+}
+
 /// Of any part of a row that is kept, from column `from` on.
 #[inline(never)]
 pub(super) fn kept_part_u8(pixels: &[u8], row: &[i8], from: usize) -> LineSums {
@@ -231,6 +251,96 @@ unsafe extern "C" fn whole(p: *const u8, h: *const i8, n: usize) -> u64 {
         ),
         concat!("asrs r0, r3, #8\n", even_pixels!()),
         "pop {{r4-r11, pc}}"
+    )
+}
+
+/// Four pixels in `$p`, lost, and what is kept of both rows' coefficients in `$h` and `$g`. The sums of the products are in r3
+/// and r4, the odd coefficients in r5 and r6, the even pixels so far in r7.
+macro_rules! both_pairs {
+    ($p:literal, $h:literal, $g:literal) => {
+        concat!(
+            "uxtab16 r7, r7, ",
+            $p,
+            "\nsmlad r3, r7, ",
+            $h,
+            ", r3\nsmlad r4, r7, ",
+            $g,
+            ", r4\neor ",
+            $p,
+            ", ",
+            $p,
+            ", #0x80008000\nsmlad r3, ",
+            $p,
+            ", r5, r3\nsmlad r4, ",
+            $p,
+            ", r6, r4\nsxtab16 r5, r5, ",
+            $h,
+            "\nsxtab16 r6, r6, ",
+            $g,
+            "\n",
+        )
+    };
+}
+
+/// Eight pixels of rows that lie at whole words.
+macro_rules! eight_of_both {
+    () => {
+        concat!(
+            "ldrd r8, r9, [r0], #8\n",
+            "ldrd r10, r11, [r1], #8\n",
+            "ldrd r12, lr, [r2], #8\n",
+            both_pairs!("r8", "r10", "r12"),
+            both_pairs!("r9", "r11", "lr"),
+        )
+    };
+}
+
+/// Two whole rows that are kept; all sides lie at whole words. Σ h·p is below, Σ h'·p above, and Σ p of the even columns in
+/// `even`. How many pixels are left is kept on the stack: there is no register for it.
+///
+/// # Safety
+/// All pointers must lie at a multiple of four and be good for `n` bytes, a multiple of four, at most [`KEPT_BLOCK`].
+#[unsafe(naked)]
+unsafe extern "C" fn both(
+    p: *const u8,
+    h: *const i8,
+    g: *const i8,
+    n: usize,
+    even: &mut u32,
+) -> u64 {
+    naked_asm!(
+        ".cpu cortex-m33",
+        "push {{r4-r11, lr}}",
+        "push {{r3}}",
+        "mov r8, r3",
+        "movs r3, #0\nmovs r4, #0\nmovs r5, #0\nmovs r6, #0\nmovs r7, #0",
+        "subs r8, r8, #64",
+        "str r8, [sp]",
+        "blo 3f",
+        "2:",
+        times!(8, eight_of_both!()),
+        "ldr r8, [sp]",
+        "subs r8, r8, #64",
+        "str r8, [sp]",
+        "bhs 2b",
+        "3:",
+        "adds r8, r8, #64",
+        "beq 5f",
+        "4:",
+        "str r8, [sp]",
+        "ldr r8, [r0], #4\nldr r10, [r1], #4\nldr r12, [r2], #4",
+        both_pairs!("r8", "r10", "r12"),
+        "ldr r8, [sp]",
+        "subs r8, r8, #4",
+        "bne 4b",
+        "5:",
+        "uxth r2, r7\nadd r2, r2, r7, lsr #16",
+        "ldr r0, [sp, #40]",
+        "str r2, [r0]",
+        "asrs r0, r3, #8",
+        "asrs r1, r4, #8",
+        "add sp, #4",
+        "pop {{r4-r11, pc}}",
     )
 }
 

@@ -166,8 +166,23 @@ impl Kernel {
     /// [`Kernel::kept_u8`], and Σ h'·p with a second row that is kept.
     #[inline(always)]
     pub fn kept_both_u8(self, pixels: &[u8], row: &[i8], second: &[i8]) -> (LineSums, i32) {
-        let sums = self.kept_u8(pixels, row);
-        (sums, self.kept_u8(pixels, second).product)
+        #[cfg(all(target_arch = "arm", any(target_feature = "dsp", rowtone_dsp)))]
+        return match self.1 {
+            Columns::Even => cortex_m::kept_both_u8(pixels, row, second),
+            Columns::All => (
+                self.kept_u8(pixels, row),
+                self.kept_u8(pixels, second).product,
+            ),
+        };
+        #[cfg(not(all(target_arch = "arm", any(target_feature = "dsp", rowtone_dsp))))]
+        {
+            let (sums, second) = self.both_u8(pixels, row, second);
+            let mut sums = LineSums::of(sums);
+            if self.1 == Columns::Even {
+                sums.pixels = of_even(0, pixels.iter().zip(row).map(|(&p, _)| p.into()));
+            }
+            (sums, second as i32)
+        }
     }
 
     /// Sums over pixels and as many columns of a row that is kept, the first of them `from`.

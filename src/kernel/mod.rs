@@ -209,6 +209,32 @@ impl Kernel {
         }
     }
 
+    /// [`Kernel::sums_u8`], and Σ h'·p with a second row of coefficients: the pixels are loaded once. The shortest length of the
+    /// three counts.
+    #[inline(always)]
+    pub fn both_u8(self, pixels: &[u8], coefficients: &[i8], second: &[i8]) -> (Sums, i64) {
+        let n = pixels.len().min(coefficients.len()).min(second.len());
+        let (pixels, coefficients, second) = (&pixels[..n], &coefficients[..n], &second[..n]);
+        match self.0 {
+            // SAFETY: as for `sums_u8`.
+            #[cfg(target_arch = "x86_64")]
+            Kind::Avx2 => unsafe { x86_64::both_u8(pixels, coefficients, second) },
+            // SAFETY: as for `sums_u8`.
+            #[cfg(target_arch = "x86_64")]
+            Kind::Avx512 { .. } => unsafe { x86_64_avx512::both_u8(pixels, coefficients, second) },
+            // SAFETY: the program was compiled for processors with NEON.
+            #[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
+            Kind::Neon => unsafe { aarch64::both_neon(pixels, coefficients, second) },
+            // SAFETY: `fastest` made this kind after it asked for the dot product.
+            #[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
+            Kind::NeonDot => unsafe { aarch64::both_dot(pixels, coefficients, second) },
+            _ => (
+                self.sums_u8(pixels, coefficients),
+                self.sums_u8(pixels, second).product,
+            ),
+        }
+    }
+
     /// Σ h·p alone, over 16-bit pixels.
     #[inline]
     pub(crate) fn product_u16(self, pixels: &[u16], coefficients: &[i8]) -> i64 {
@@ -284,6 +310,10 @@ mod tests {
             for kernel in Kernel::all() {
                 for (p, h) in [(&p, &h), (&full, &signs), (&zero, &most), (&full, &most)] {
                     assert_eq!(kernel.sums_u8(p, h), exact(p, h), "{kernel:?} {n}");
+                    for second in [&most, &signs] {
+                        let both = (exact(p, h), exact(p, second).product);
+                        assert_eq!(kernel.both_u8(p, h, second), both, "{kernel:?} {n}");
+                    }
                 }
                 for (p, h) in [
                     (&deep, &h),
@@ -333,6 +363,8 @@ mod tests {
                     proptest::prop_assert_eq!(u64::from(kernel.light(from, &deep)), light_deep);
                     if from == 0 {
                         proptest::prop_assert_eq!(kernel.kept_u8(&bytes, &kept), sums);
+                        let both = (sums, sums.product);
+                        proptest::prop_assert_eq!(kernel.kept_both_u8(&bytes, &kept, &kept), both);
                         proptest::prop_assert_eq!(kernel.kept_spread(spread::Spread::Words, &words, &kept), sums);
                     }
                 }

@@ -164,3 +164,36 @@ pub(super) fn sums_u16(pixels: &[u16], coefficients: &[i8]) -> Sums {
     }
     sums
 }
+
+/// As [`sums_u8`], with a second row of coefficients; all of the same length.
+#[target_feature(enable = "avx2")]
+pub(super) fn both_u8(pixels: &[u8], coefficients: &[i8], second: &[i8]) -> (Sums, i64) {
+    let (mut sums, mut product) = (Sums::default(), 0);
+    let (ones, zero) = (_mm256_set1_epi16(1), _mm256_setzero_si256());
+    let blocks = pixels.chunks(1 << 16).zip(coefficients.chunks(1 << 16));
+    for ((p, h), g) in blocks.zip(second.chunks(1 << 16)) {
+        let (p_steps, p_rest) = p.as_chunks::<64>();
+        let (h_steps, h_rest) = h.as_chunks::<64>();
+        let (g_steps, g_rest) = g.as_chunks::<64>();
+        let (mut first, mut other, mut plain) = ([zero; 2], [zero; 2], [zero; 2]);
+        for ((p, h), g) in p_steps.iter().zip(h_steps).zip(g_steps) {
+            ask_ahead(p);
+            let (p, h, g) = (load(p), load(h), load(g));
+            for k in 0..2 {
+                let m = _mm256_madd_epi16(_mm256_maddubs_epi16(p[k], h[k]), ones);
+                first[k] = _mm256_add_epi32(first[k], m);
+                let m = _mm256_madd_epi16(_mm256_maddubs_epi16(p[k], g[k]), ones);
+                other[k] = _mm256_add_epi32(other[k], m);
+                plain[k] = _mm256_add_epi64(plain[k], _mm256_sad_epu8(p[k], zero));
+            }
+        }
+        sums.product += sum_i32(_mm256_add_epi32(first[0], first[1]));
+        sums.pixels += sum_i64(_mm256_add_epi64(plain[0], plain[1]));
+        product += sum_i32(_mm256_add_epi32(other[0], other[1]));
+        let rest = portable::sums_u8(p_rest, h_rest);
+        sums.product += rest.product;
+        sums.pixels += rest.pixels;
+        product += portable::sums_u8(p_rest, g_rest).product;
+    }
+    (sums, product)
+}

@@ -116,6 +116,38 @@ fn block_u8(pixels: &[u8], coefficients: &[i8]) -> Block {
     )
 }
 
+/// As [`sums_u8`], with a second row of coefficients; all of the same length.
+#[target_feature(enable = "avx512f,avx512bw,avx512vnni")]
+pub(super) fn both_u8(pixels: &[u8], coefficients: &[i8], second: &[i8]) -> (Sums, i64) {
+    let (mut sums, mut product) = (Sums::default(), 0);
+    let (ones, zero) = (_mm512_set1_epi8(1), _mm512_setzero_si512());
+    let blocks = pixels.chunks(BLOCK).zip(coefficients.chunks(BLOCK));
+    for ((p, h), g) in blocks.zip(second.chunks(BLOCK)) {
+        let (mut first, mut other, mut plain) = (zero, zero, zero);
+        let (p_steps, p_rest) = p.as_chunks::<64>();
+        let (h_steps, h_rest) = h.as_chunks::<64>();
+        let (g_steps, g_rest) = g.as_chunks::<64>();
+        for ((p, h), g) in p_steps.iter().zip(h_steps).zip(g_steps) {
+            ask_ahead(p);
+            let p = load(p);
+            first = _mm512_dpbusd_epi32(first, p, load(h));
+            other = _mm512_dpbusd_epi32(other, p, load(g));
+            plain = _mm512_dpbusd_epi32(plain, p, ones);
+        }
+        if !p_rest.is_empty() {
+            let p = load_rest(p_rest);
+            first = _mm512_dpbusd_epi32(first, p, load_rest(h_rest));
+            other = _mm512_dpbusd_epi32(other, p, load_rest(g_rest));
+            plain = _mm512_dpbusd_epi32(plain, p, ones);
+        }
+        let block = sum(first, plain);
+        sums.product += i64::from(block.product);
+        sums.pixels += block.pixels as u64;
+        product += i64::from(_mm512_reduce_add_epi32(other));
+    }
+    (sums, product)
+}
+
 /// Σ h·p = Σ h·low + 256·Σ h·high, of the pixels' bytes: as bytes they are multiplied by (h, 0) and (0, h).
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni")]
 pub(super) fn sums_u16(pixels: &[u16], coefficients: &[i8]) -> Sums {

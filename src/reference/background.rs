@@ -300,14 +300,18 @@ impl Store<'_> {
             };
         }
         let frames = 1.0 / self.keep_of(row);
-        let build = VerticalBuild::new(&self.recipe, frames, table, row, self.rows())
+        let build = VerticalBuild::new(&self.recipe, frames, table, self.reach(row))
             .without(self.left_out(row));
         Work::BuildVertical { row, table, build }
     }
 
     /// Makes some fresh columns what the kernel keeps; at their end they take their row's place.
     fn keep_one_step(&mut self, columns: usize) {
-        let (kernel, width, rows) = (self.recipe.kernel, self.width, self.rows());
+        let (kernel, width) = (self.recipe.kernel, self.width);
+        let reach = match self.background.work {
+            Work::Keep { row, .. } => self.reach(row),
+            _ => return,
+        };
         let Work::Keep {
             row,
             table,
@@ -350,7 +354,7 @@ impl Store<'_> {
                     (v.coefficients.get_mut(span), v.tables.get_mut(*row))
             {
                 coefficients.copy_from_slice(v.fresh);
-                place(&self.recipe, [*row, rows], built, vertical, slot);
+                place(reach, built, vertical, slot);
             }
         }
         self.background.work = Work::Nothing;

@@ -47,6 +47,11 @@ impl RowLearning {
         watched: Watched::EMPTY,
     };
 
+    /// A line of it was averaged in.
+    pub(super) fn was_seen(&self) -> bool {
+        self.light > 0.0
+    }
+
     pub(crate) fn frames(&self) -> u16 {
         self.frames.max(1)
     }

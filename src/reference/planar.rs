@@ -56,6 +56,9 @@ impl Store<'_> {
             return None;
         }
         let stride = self.recipe.stride;
+        if self.reach(row) == 0 {
+            return None;
+        }
         Some(Beside {
             above: self.mean(row.checked_sub(stride)?)?,
             below: self.mean(row + stride)?,
@@ -67,6 +70,19 @@ impl Store<'_> {
     #[inline]
     pub(crate) fn is_planar(&self) -> bool {
         self.buffers.vertical.is_some()
+    }
+
+    /// Rows of this one's colour on either side that were seen, as far as they are used.
+    pub(super) fn reach(&self, row: usize) -> usize {
+        let stride = self.recipe.stride;
+        let seen = |row: usize| {
+            let learning = self.buffers.learning.get(row);
+            learning.is_some_and(RowLearning::was_seen)
+        };
+        let steps = 1..=VerticalBuild::MOST_REACH;
+        let both =
+            |&k: &usize| row >= k * stride && seen(row - k * stride) && seen(row + k * stride);
+        steps.take_while(both).count()
     }
 
     /// What the line path needs of a row's second product.
@@ -90,7 +106,7 @@ impl Store<'_> {
     /// Builds a row's second product, after its first one, whose coefficients are still as they are: these are made what the
     /// kernel keeps.
     pub(super) fn build_vertical(&mut self, row: usize) {
-        let (width, rows) = (self.width, self.rows());
+        let (width, reach) = (self.width, self.reach(row));
         let span = row * width..(row + 1) * width;
         let frames = f32::from(
             self.buffers
@@ -109,7 +125,7 @@ impl Store<'_> {
         ) else {
             return;
         };
-        let build = VerticalBuild::new(&self.recipe, frames, *table, row, rows).without(left_out);
+        let build = VerticalBuild::new(&self.recipe, frames, *table, reach).without(left_out);
         let built = build.all(&mut VerticalParts {
             picture: b.mean,
             row,
@@ -119,7 +135,7 @@ impl Store<'_> {
             coefficients,
         });
         self.recipe.kernel.keep_some(coefficients, 0..width);
-        place(&self.recipe, [row, rows], built, slot, table);
+        place(reach, built, slot, table);
     }
 
     /// The picture was `down_px` below its row of the reference when a line was averaged into it, with a weight of `keep`:
@@ -127,7 +143,7 @@ impl Store<'_> {
     pub(crate) fn settle_down(&mut self, row: usize, span: Range<usize>, down_px: f32, keep: f32) {
         let small = down_px.abs() < STILL_PX || down_px.is_nan();
         let (width, stride) = (self.width, self.recipe.stride);
-        if small || !VerticalBuild::can_be(&self.recipe, row, self.rows()) {
+        if small || !VerticalBuild::is_enough(self.reach(row)) {
             return;
         }
         let weights = five(-down_px.clamp(-MOST_PX, MOST_PX) / stride as f32);
@@ -224,8 +240,7 @@ impl Store<'_> {
 /// Puts what was built of a row's second product in its place; where there are no rows beside it, what y does to the first
 /// product is not known either.
 pub(super) fn place(
-    recipe: &super::Recipe,
-    [row, rows]: [usize; 2],
+    reach: usize,
     built: VerticalTable,
     slot: &mut VerticalTable,
     table: &mut RowTable,
@@ -234,7 +249,7 @@ pub(super) fn place(
         learned_px: slot.learned_px,
         ..built
     };
-    if !VerticalBuild::can_be(recipe, row, rows) {
+    if !VerticalBuild::is_enough(reach) {
         *table = table.without_texture();
     }
 }

@@ -85,6 +85,12 @@ impl Planar {
         information
     }
 
+    /// Before anything is known of a line: it is where those before led.
+    fn expect(&mut self, right_px: f32, table: &VerticalTable) {
+        self.near_px = self.down_px;
+        self.lean_px = table.lean_px([right_px, self.near_px]);
+    }
+
     /// The line fits.
     #[inline(always)]
     fn accept(&mut self, information: f32) {
@@ -118,13 +124,24 @@ impl Planar {
 impl Tracker<'_> {
     /// A line of a row begins, which is expected at `shift_px` along it.
     pub(super) fn begin_planar<P: Pixel>(&mut self, row: usize, pixels: &[P], shift_px: f32) {
+        let Some(table) = self.store.vertical_table(row) else {
+            return;
+        };
         let whole = nearest_step(shift_px, i32::from(self.config.stride));
-        // At the brightness of the line before.
-        let second = self.second_product(row, pixels, whole);
-        if let (Some(second), Some(table)) = (second, self.store.vertical_table(row)) {
-            self.planar.approach(shift_px - whole as f32, second, table);
-            self.correlator.lean_px = self.planar.lean_px;
+        let near = shift_px - whole as f32;
+        // A picture that moves swiftly may be at another whole pixel, where the second product says nothing. At the
+        // brightness of the line before.
+        let second = match self.prediction.is_at_rest() {
+            true => self.second_product(row, pixels, whole),
+            false => None,
+        };
+        match second {
+            Some(second) => {
+                self.planar.approach(near, second, table);
+            }
+            None => self.planar.expect(near, table),
         }
+        self.correlator.lean_px = self.planar.lean_px;
     }
 
     /// The second half of a line that was found at `shift_px` along its row; where it is, what it leads to along the columns

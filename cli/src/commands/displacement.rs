@@ -5,7 +5,7 @@ use std::io::{self, BufWriter, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
-use rowtone::timeline::Displacement;
+use rowtone::timeline::{Displacement, Vertical};
 
 use crate::output::progress::Progress;
 use crate::output::series::{Measured, Series, Shift};
@@ -16,6 +16,9 @@ use rowtone_measure::restore::Method;
 use rowtone_measure::restore::long::{Restoration, USUAL_CORNER_HZ};
 use rowtone_measure::tracking::{FrameShifts, Shifts};
 
+/// Where less is known along the edges than this share of what is known across them, nothing is.
+const LEAST_CONDITIONED: f64 = 3e-3;
+
 /// Samples a second that `--rows-per-sample` aims at when it is not given.
 const USUAL_RATE_HZ: f64 = 8000.0;
 
@@ -23,8 +26,9 @@ const USUAL_RATE_HZ: f64 = 8000.0;
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Example:\n  rowtone displacement clip.y4m --line-time-us 18.9 -o motion.csv\n\n\
-    CSV: t_s,row,d_px,sd_px. t_s is the middle of the sample's exposure, row its first row in the \
-    (turned) picture; d_px and sd_px are empty where it could not be measured. Each row's mean over \
+    CSV: t_s,row,x_px,x_sd_px,y_px,y_sd_px; with --axes x: t_s,row,d_px,sd_px. t_s is the middle of the \
+    sample's exposure, row its first row in the (turned) picture; x is to the right, y downwards; what could \
+    not be measured is empty. Each row's mean over \
     the recording is removed. NPY: the same columns as 64-bit floats. Both hold what was measured and \
     nothing else.\n\n\
     WAV: a sound without gaps, 32-bit floats in px at a constant rate: blank time, lost frames and rows \
@@ -108,7 +112,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let mut shifts = Shifts::start(Feed::open(&args.camera)?, None)?;
     let rows_per_sample = rows_per_sample(args.rows_per_sample, &shifts);
     let slots = shifts.part.height.div_ceil(rows_per_sample);
-    let mut series = Series::new(shifts.part.y, rows_per_sample, slots);
+    let mut series = Series::new(shifts.part.y, rows_per_sample, slots, shifts.axes);
     let outcome = collect(&mut shifts, &mut series);
     if let Some(warning) = shifts.warning() {
         eprintln!("rowtone: {warning}");
@@ -121,6 +125,11 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             &series,
             rate_hz(rows_per_sample, slots, &shifts.camera),
         )?;
+        if series.conditioned() < LEAST_CONDITIONED {
+            let note = "nearly all edges lean one way: only the motion across them can be told (--axes x reads it \
+                along the rows)";
+            eprintln!("rowtone: {}: {note}", shifts.name);
+        }
         if series.measured() == 0 {
             return outcome.and(Err(Failure::input(format!(
                 "{}: no row could be measured: the picture has too little texture across",
@@ -175,21 +184,8 @@ fn combine(frame: &FrameShifts, shifts: &Shifts, rows_per_sample: usize, to: &mu
         let count = rest.iter().take_while(|row| group_of(row) <= slot).count();
         let (rows, after) = rest.split_at(count);
         rest = after;
-        let (mut px, mut ns, mut weight) = (0.0, 0.0, 0.0);
-        for row in rows {
-            let w = f64::from(row.information_per_px2);
-            px += w * f64::from(row.shift_px);
-            ns += w * (row.time_ns - frame.start_ns) as f64;
-            weight += w;
-        }
-        to.push(if weight > 0.0 {
-            Measured {
-                after_s: (ns / weight * 1e-9) as f32,
-                shift: Some(Shift {
-                    px: (px / weight) as f32,
-                    information_per_px2: weight as f32,
-                }),
-            }
+        to.push(if let Some(measured) = sum(rows, frame.start_ns) {
+            measured
         } else {
             let first = slot * rows_per_sample;
             let last = (first + rows_per_sample).min(part.height) - 1;
@@ -200,6 +196,59 @@ fn combine(frame: &FrameShifts, shifts: &Shifts, rows_per_sample: usize, to: &mu
             }
         });
     }
+}
+
+/// Scores and informations of rows added up; `None` where nothing is known.
+fn sum(rows: &[Displacement], start_ns: i64) -> Option<Measured> {
+    let (mut px, mut ns, mut weight) = (0.0, 0.0, 0.0);
+    let (mut cross, mut along, mut score, mut along_ns) = (0.0, 0.0, 0.0, 0.0);
+    for row in rows {
+        let w = f64::from(row.information_per_px2);
+        let after_ns = (row.time_ns - start_ns) as f64;
+        px += w * f64::from(row.shift_px);
+        ns += w * after_ns;
+        weight += w;
+        if let Some(v) = &row.vertical {
+            let (k, own) = (f64::from(v.coupling), f64::from(v.information_per_px2));
+            cross += k * w;
+            along += k * k * w + own;
+            along_ns += own * after_ns;
+            score += k * w * f64::from(row.shift_px) + own * f64::from(v.shift_px);
+        }
+    }
+    let coupling = if weight > 0.0 { cross / weight } else { 0.0 };
+    let own = along - coupling * cross;
+    let known = own > 1e-6 * along;
+    let vertical = Vertical {
+        shift_px: if known {
+            ((score - coupling * px) / own) as f32
+        } else {
+            0.0
+        },
+        information_per_px2: if known { own as f32 } else { 0.0 },
+        coupling: coupling as f32,
+        ..Vertical::default()
+    };
+    let after_ns = match weight > 0.0 {
+        true => ns / weight,
+        false if known => along_ns / along,
+        false => return None,
+    };
+    Some(Measured {
+        after_s: (after_ns * 1e-9) as f32,
+        shift: Some(Shift {
+            px: if weight > 0.0 {
+                (px / weight) as f32
+            } else {
+                0.0
+            },
+            information_per_px2: weight as f32,
+            vertical: rows
+                .iter()
+                .any(|row| row.vertical.is_some())
+                .then_some(vertical),
+        }),
+    })
 }
 
 fn write(args: &Args, format: Format, series: &Series, rate_hz: u32) -> Result<(), Failure> {

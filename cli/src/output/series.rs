@@ -5,6 +5,9 @@
 
 use std::io::{self, Write};
 
+use rowtone::timeline::Vertical;
+use rowtone::tracker::Axes;
+
 /// Where a sample could not be measured, its information.
 const NOT_MEASURED: f32 = 0.0;
 
@@ -20,11 +23,19 @@ pub struct Measured {
 /// A shift and how well it is known.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shift {
-    /// Shift to the right, px.
+    /// Shift to the right, px; where there is a `vertical`, its first measurement.
     pub px: f32,
     /// 1/variance, 1/px², above 0.
     pub information_per_px2: f32,
+    /// What is known of the motion along the columns.
+    pub vertical: Option<Vertical>,
 }
+
+/// A displacement along one axis and its standard deviation, px, where it could be measured.
+pub type Known = Option<(f64, f64)>;
+
+/// Less sure than this is not measured, px.
+const WORST_SD_PX: f64 = 0.5;
 
 /// One line of the output.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,8 +44,10 @@ pub struct Sample {
     pub t_s: f64,
     /// First row of the sample in the picture.
     pub row: usize,
-    /// Displacement and its standard deviation, px, where it could be measured.
-    pub d_px: Option<(f64, f64)>,
+    /// Displacement along the rows.
+    pub x_px: Known,
+    /// Along the columns, where both axes are measured.
+    pub y_px: Known,
 }
 
 /// The displacements of a recording: as many samples in every frame.
@@ -47,11 +60,13 @@ pub struct Series {
     after_s: Vec<f32>,
     px: Vec<f32>,
     information: Vec<f32>,
+    /// Where both axes are measured.
+    vertical: Option<Vec<Vertical>>,
 }
 
 impl Series {
     /// An empty series with `slots` samples a frame, each of `rows_per_sample` rows from `first_row` on.
-    pub fn new(first_row: usize, rows_per_sample: usize, slots: usize) -> Self {
+    pub fn new(first_row: usize, rows_per_sample: usize, slots: usize, axes: Axes) -> Self {
         Self {
             first_row,
             rows_per_sample,
@@ -60,6 +75,7 @@ impl Series {
             after_s: Vec::new(),
             px: Vec::new(),
             information: Vec::new(),
+            vertical: (axes == Axes::Xy).then(Vec::new),
         }
     }
 
@@ -72,6 +88,10 @@ impl Series {
             self.px.push(sample.shift.map_or(0.0, |s| s.px));
             self.information
                 .push(sample.shift.map_or(NOT_MEASURED, |s| s.information_per_px2));
+            if let Some(vertical) = &mut self.vertical {
+                let known = sample.shift.and_then(|s| s.vertical);
+                vertical.push(known.unwrap_or_default());
+            }
         }
     }
 
@@ -85,12 +105,30 @@ impl Series {
         self.frames_ns.len()
     }
 
-    /// Samples that could be measured.
+    /// Samples that could be measured along some axis.
     pub fn measured(&self) -> usize {
-        self.information
-            .iter()
-            .filter(|&&w| w > NOT_MEASURED)
+        let samples = self.samples();
+        samples
+            .filter(|s| s.x_px.is_some() || s.y_px.is_some())
             .count()
+    }
+
+    /// Share of what is known across the edges that is known along them: next to nothing where all of them lean one way. 1
+    /// where the rows alone are measured.
+    pub fn conditioned(&self) -> f64 {
+        let Some(vertical) = &self.vertical else {
+            return 1.0;
+        };
+        let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
+        for (&first, v) in self.information.iter().zip(vertical) {
+            let (first, k) = (f64::from(first), f64::from(v.coupling));
+            xx += first;
+            xy += k * first;
+            yy += k * k * first + f64::from(v.information_per_px2);
+        }
+        let half = 0.5 * (xx + yy);
+        let root = (0.25 * (xx - yy).powi(2) + xy * xy).sqrt();
+        (half - root) / (half + root).max(f64::MIN_POSITIVE)
     }
 
     /// From the first sample to the last, s.
@@ -114,6 +152,19 @@ impl Series {
                     self.px[i] -= mean;
                 }
             }
+            let Some(vertical) = &mut self.vertical else {
+                continue;
+            };
+            let mut own = vertical.iter_mut().skip(slot).step_by(self.slots);
+            let (mut sum, mut weight) = (0.0, 0.0);
+            own.by_ref().for_each(|v| {
+                let w = f64::from(v.information_per_px2);
+                sum += w * f64::from(v.shift_px);
+                weight += w;
+            });
+            let own = vertical.iter_mut().skip(slot).step_by(self.slots);
+            own.filter(|v| v.information_per_px2 > 0.0)
+                .for_each(|v| v.shift_px -= (sum / weight) as f32);
         }
     }
 
@@ -121,38 +172,85 @@ impl Series {
     pub fn samples(&self) -> impl Iterator<Item = Sample> {
         (0..self.px.len()).map(|i| {
             let (frame, slot) = (i / self.slots, i % self.slots);
-            let information = f64::from(self.information[i]);
+            let (x_px, y_px) = self.known(i);
             Sample {
                 t_s: self.frames_ns[frame] as f64 * 1e-9 + f64::from(self.after_s[i]),
                 row: self.first_row + slot * self.rows_per_sample,
-                d_px: (information > 0.0)
-                    .then(|| (f64::from(self.px[i]), information.sqrt().recip())),
+                x_px,
+                y_px,
             }
         })
     }
 
-    /// As CSV: `t_s,row,d_px,sd_px`, one line a sample, `d_px` and `sd_px` empty where it could not be
-    /// measured; with a scale also `d_um`.
+    /// What a sample says of both axes.
+    fn known(&self, i: usize) -> (Known, Known) {
+        let (px, information) = (f64::from(self.px[i]), f64::from(self.information[i]));
+        let Some(v) = self.vertical.as_ref().map(|v| v[i]) else {
+            let x = (information > 0.0).then(|| (px, information.sqrt().recip()));
+            return (x, None);
+        };
+        let sure = |px: f64, sd: f64| (sd < WORST_SD_PX).then_some((px, sd));
+        let (own, k) = (f64::from(v.information_per_px2), f64::from(v.coupling));
+        let known = own * WORST_SD_PX * WORST_SD_PX > 1.0;
+        // Upright edges tell of x whatever y is: taken to be within a pixel or so.
+        let (y, y_sd) = match known {
+            true => (f64::from(v.shift_px), own.sqrt().recip()),
+            false => (0.0, 1.0),
+        };
+        let x_sd = (information.recip() + (k * y_sd).powi(2)).sqrt();
+        (sure(px - k * y, x_sd), sure(y, y_sd))
+    }
+
+    /// As CSV: `t_s,row,d_px,sd_px`, one line a sample, or `t_s,row,x_px,x_sd_px,y_px,y_sd_px` where both axes are measured;
+    /// empty where it could not be measured; with a scale also `d_um`, or `x_um` and `y_um`.
     ///
     /// # Errors
     /// What writing says.
     pub fn write_csv(&self, to: &mut impl Write, um_per_px: Option<f64>) -> io::Result<()> {
-        let um_column = if um_per_px.is_some() { ",d_um" } else { "" };
-        writeln!(to, "t_s,row,d_px,sd_px{um_column}")?;
-        for Sample { t_s, row, d_px } in self.samples() {
-            match (d_px, um_per_px) {
-                (Some((d, sd)), None) => writeln!(to, "{t_s:.9},{row},{d:.6},{sd:.6}")?,
-                (Some((d, sd)), Some(um)) => {
-                    writeln!(to, "{t_s:.9},{row},{d:.6},{sd:.6},{:.6}", d * um)?;
+        let planar = self.vertical.is_some();
+        write!(to, "t_s,row")?;
+        let names: &[&str] = if planar { &["x", "y"] } else { &["d"] };
+        for name in names {
+            let prefix = if planar {
+                format!("{name}_")
+            } else {
+                String::new()
+            };
+            write!(to, ",{name}_px,{prefix}sd_px")?;
+        }
+        for name in names.iter().filter(|_| um_per_px.is_some()) {
+            write!(to, ",{name}_um")?;
+        }
+        writeln!(to)?;
+        for Sample {
+            t_s,
+            row,
+            x_px,
+            y_px,
+        } in self.samples()
+        {
+            write!(to, "{t_s:.9},{row}")?;
+            let known = &[x_px, y_px][..names.len()];
+            for px in known {
+                match px {
+                    Some((d, sd)) => write!(to, ",{d:.6},{sd:.6}")?,
+                    None => write!(to, ",,")?,
                 }
-                (None, None) => writeln!(to, "{t_s:.9},{row},,")?,
-                (None, Some(_)) => writeln!(to, "{t_s:.9},{row},,,")?,
             }
+            if let Some(um) = um_per_px {
+                for px in known {
+                    match px {
+                        Some((d, _)) => write!(to, ",{:.6}", d * um)?,
+                        None => write!(to, ",")?,
+                    }
+                }
+            }
+            writeln!(to)?;
         }
         Ok(())
     }
 
-    /// As an NPY file: an array of f64 with the columns t_s, row, d_px, sd_px; not-a-number where it
+    /// As an NPY file: an array of f64 with the columns t_s, row, d_px, sd_px (or x and y, as the CSV); not-a-number where it
     /// could not be measured.
     ///
     /// # Errors
@@ -161,8 +259,9 @@ impl Series {
         // NumPy's format version 1.0: magic, version, header length, a Python dictionary that is
         // padded so that the data start at a multiple of 64.
         let mut header = format!(
-            "{{'descr': '<f8', 'fortran_order': False, 'shape': ({}, 4), }}",
-            self.px.len()
+            "{{'descr': '<f8', 'fortran_order': False, 'shape': ({}, {}), }}",
+            self.px.len(),
+            if self.vertical.is_some() { 6 } else { 4 }
         );
         let before = 10;
         let padding = 64 - (before + header.len() + 1) % 64;
@@ -171,21 +270,33 @@ impl Series {
         to.write_all(b"\x93NUMPY\x01\x00")?;
         to.write_all(&(header.len() as u16).to_le_bytes())?;
         to.write_all(header.as_bytes())?;
-        for Sample { t_s, row, d_px } in self.samples() {
-            let (d, sd) = d_px.unwrap_or((f64::NAN, f64::NAN));
-            for value in [t_s, row as f64, d, sd] {
+        for Sample {
+            t_s,
+            row,
+            x_px,
+            y_px,
+        } in self.samples()
+        {
+            let unknown = (f64::NAN, f64::NAN);
+            let ((x, x_sd), (y, y_sd)) = (x_px.unwrap_or(unknown), y_px.unwrap_or(unknown));
+            let columns = [t_s, row as f64, x, x_sd, y, y_sd];
+            let columns = match self.vertical {
+                Some(_) => &columns[..],
+                None => &columns[..4],
+            };
+            for value in columns {
                 to.write_all(&value.to_le_bytes())?;
             }
         }
         Ok(())
     }
 
-    /// The displacement at a constant rate, px; `None` in blank time, lost frames and rows that could not be measured.
+    /// The displacement along the rows at a constant rate, px; `None` in blank time, lost frames and rows that could not be measured.
     ///
     /// Between samples that follow each other a polynomial of third degree runs through the four around (a straight
     /// line beside a gap). Starts at the first sample and ends at the last.
     pub fn evenly(&self, rate_hz: f64) -> impl Iterator<Item = Option<f64>> {
-        let mut known = self.samples().filter_map(|s| Some((s.t_s, s.d_px?.0)));
+        let mut known = self.samples().filter_map(|s| Some((s.t_s, s.x_px?.0)));
         let mut around = [None, known.next(), known.next(), known.next()];
         let start_s = around[1].map_or(0.0, |first: Point| first.0);
         (0_u64..).map_while(move |k| {
@@ -238,12 +349,13 @@ mod tests {
 
     /// Two slots, three frames; slot 1 of frame 1 was not measured.
     fn series() -> Series {
-        let mut series = Series::new(10, 4, 2);
+        let mut series = Series::new(10, 4, 2, Axes::X);
         let sample = |after_s, px| Measured {
             after_s,
             shift: Some(Shift {
                 px,
                 information_per_px2: 10_000.0,
+                vertical: None,
             }),
         };
         series.push_frame(-500_000_000, &[sample(0.0, 1.0), sample(0.25, 5.0)]);
@@ -289,14 +401,14 @@ mod tests {
         assert_eq!(even[3], None);
         let even = fill(&even, Method::Linear);
         assert_eq!(even, [-1.0, -1.0, 0.0, 0.5, 1.0, 1.0]);
-        assert_eq!(Series::new(0, 1, 1).evenly(8000.0).count(), 0);
+        assert_eq!(Series::new(0, 1, 1, Axes::X).evenly(8000.0).count(), 0);
     }
 
     #[test]
     fn a_tone_on_another_grid_is_the_tone() {
         // 40 samples of 0.4 ms in every 20 ms, read at 2.5 kHz and a little: the grids drift against each other.
         let tone = |t: f64| (std::f64::consts::TAU * 100.0 * t).sin();
-        let mut series = Series::new(0, 1, 40);
+        let mut series = Series::new(0, 1, 40, Axes::X);
         for frame in 0..10 {
             let samples: Vec<Measured> = (0..40)
                 .map(|k| Measured {
@@ -304,6 +416,7 @@ mod tests {
                     shift: Some(Shift {
                         px: tone(0.02 * f64::from(frame) + 4e-4 * f64::from(k)) as f32,
                         information_per_px2: 1.0,
+                        vertical: None,
                     }),
                 })
                 .collect();

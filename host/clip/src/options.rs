@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use rowtone::camera::Timing;
 use rowtone::report::{Warning, Warnings};
+use rowtone::tracker::Axes;
 
 use super::clock::{Clock, Stamped, Times};
 use super::ffmpeg::Probe;
@@ -66,12 +67,23 @@ pub struct CameraArgs {
         allow_hyphen_values = true
     )]
     pub rotate: Turn,
+    /// Motion along the rows alone (x), or along rows and columns (xy)
+    #[arg(long, value_name = "x|xy", default_value = "xy", value_parser = axes)]
+    pub axes: Axes,
     /// All rows are exposed at once (high-speed cameras): one sample a frame
     #[arg(long)]
     pub global_shutter: bool,
     /// Scale: adds µm and mm/s to the output
     #[arg(long, value_name = "S", value_parser = positive, allow_negative_numbers = true)]
     pub um_per_px: Option<f64>,
+}
+
+fn axes(text: &str) -> Result<Axes, String> {
+    match text {
+        "x" => Ok(Axes::X),
+        "xy" => Ok(Axes::Xy),
+        _ => Err("want x or xy".to_owned()),
+    }
 }
 
 /// A finite number above 0.
@@ -107,6 +119,8 @@ pub struct Camera {
     pub background: Option<Rect>,
     /// How the picture is turned.
     pub turn: Turn,
+    /// Along which axes of the turned picture motion is measured.
+    pub axes: Axes,
     /// What every report on the recording warns of.
     pub warnings: Warnings,
     /// Scale, µm a pixel.
@@ -147,6 +161,7 @@ impl CameraArgs {
             roi: Roi::Auto,
             background: None,
             rotate: Turn::No,
+            axes: Axes::X,
             global_shutter: false,
             um_per_px: None,
         }
@@ -339,6 +354,7 @@ impl CameraArgs {
             part,
             background,
             turn,
+            axes: self.axes,
             warnings,
             um_per_px: self.um_per_px,
             doubt,

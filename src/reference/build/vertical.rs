@@ -136,16 +136,13 @@ pub struct VerticalBuild {
 }
 
 impl VerticalBuild {
-    /// A row of `rows` has rows enough of its colour beside it.
-    pub(crate) fn can_be(recipe: &Recipe, row: usize, rows: usize) -> bool {
-        Self::reach(recipe, row, rows) >= LEAST_ROWS
+    /// So many rows of its colour on either side are enough.
+    pub(crate) const fn is_enough(reach: usize) -> bool {
+        reach >= LEAST_ROWS
     }
 
-    /// Rows of its colour on either side, as far as they are used.
-    fn reach(recipe: &Recipe, row: usize, rows: usize) -> usize {
-        let below = rows.saturating_sub(row + 1);
-        (row.min(below) / recipe.stride).min(LAGS)
-    }
+    /// More rows of its colour on either side are not used.
+    pub(crate) const MOST_REACH: usize = LAGS;
 
     /// The same, without these pixels and what the band's filter mixes with them.
     pub(in crate::reference) fn without(mut self, left_out: [u16; LEFT_OUT]) -> Self {
@@ -153,14 +150,15 @@ impl VerticalBuild {
         self
     }
 
-    /// Begins a row of `rows`, whose first product has this table. `frames`: how many frames the reference is the mean of.
-    pub fn new(recipe: &Recipe, frames: f32, table: RowTable, row: usize, rows: usize) -> Self {
+    /// Begins a row whose first product has this table. `frames`: how many frames the reference is the mean of; `reach`: rows
+    /// of its colour on either side that are known.
+    pub fn new(recipe: &Recipe, frames: f32, table: RowTable, reach: usize) -> Self {
         Self {
             build: Build::new(recipe, frames),
             table,
             step: VerticalStep::Prepare(Step::Weigh),
             column: 0,
-            reach: Self::reach(recipe, row, rows),
+            reach: reach.min(LAGS),
             lean: 0.0,
             gamma: 0.0,
             first_q: [0.0; 2 * LAGS + 1],
@@ -192,7 +190,7 @@ impl VerticalBuild {
             && parts.first.len() == width
             && parts.scratch.len() == 2 * width
             && parts.coefficients.len() == width;
-        if !fits || self.reach < LEAST_ROWS {
+        if !fits || !Self::is_enough(self.reach) {
             parts.coefficients.fill(0);
             return Some(VerticalTable::EMPTY);
         }
@@ -651,7 +649,7 @@ mod tests {
                 scratch: &mut scratch,
                 coefficients: &mut first,
             });
-            let build = VerticalBuild::new(&recipe, frames, table, 7, ROWS);
+            let build = VerticalBuild::new(&recipe, frames, table, 7);
             let vertical = build.all(&mut VerticalParts {
                 picture: &picture,
                 row: 7,
@@ -725,26 +723,5 @@ mod tests {
             assert_eq!(row.vertical.information_per_px2(), 0.0);
             assert!((row.vertical.coupling() - libm::tanf(0.52)).abs() < 0.05);
         }
-    }
-
-    #[test]
-    fn rows_at_the_edge_know_nothing_of_y() {
-        let recipe = Recipe {
-            level: Level::Fine,
-            stride: 2,
-            margin_px: 0,
-            noise: PixelNoise {
-                dark: 1.0,
-                per_value: 0.0,
-            },
-            counts_per_value: 128.0,
-            saturation: 254.0,
-            kernel: Kernel::PORTABLE,
-        };
-        let can: Vec<bool> = (0..10)
-            .map(|row| VerticalBuild::can_be(&recipe, row, 10))
-            .collect();
-        assert_eq!(can.iter().filter(|&&can| can).count(), 2);
-        assert!(can[4] && can[5]);
     }
 }

@@ -1,7 +1,7 @@
 //! The tracker's memory.
 
-use rowtone::reference::RowTable;
-use rowtone::tracker::{ColumnLearning, RowLearning, Storage};
+use rowtone::reference::{RowTable, VerticalTable};
+use rowtone::tracker::{Axes, ColumnLearning, RowLearning, Storage, VerticalStorage};
 
 /// Vectors to lend to a [`rowtone::tracker::Tracker`].
 #[derive(Clone, Debug)]
@@ -14,6 +14,15 @@ pub struct TrackerMemory {
     columns: Vec<ColumnLearning>,
     fresh: Vec<i8>,
     scratch: Vec<f32>,
+    vertical: Option<Vertical>,
+}
+
+/// What measuring along both axes needs besides.
+#[derive(Clone, Debug)]
+struct Vertical {
+    coefficients: Vec<i8>,
+    tables: Vec<VerticalTable>,
+    fresh: Vec<i8>,
 }
 
 impl TrackerMemory {
@@ -28,6 +37,20 @@ impl TrackerMemory {
             columns: vec![ColumnLearning::default(); width],
             fresh: vec![0; width],
             scratch: vec![0.0; 2 * width],
+            vertical: None,
+        }
+    }
+
+    /// The same, for these axes.
+    pub fn for_axes(width: usize, rows: usize, axes: Axes) -> Self {
+        let vertical = Vertical {
+            coefficients: vec![0; width * rows],
+            tables: vec![VerticalTable::default(); rows],
+            fresh: vec![0; width],
+        };
+        Self {
+            vertical: (axes == Axes::Xy).then_some(vertical),
+            ..Self::new(width, rows)
         }
     }
 
@@ -43,7 +66,11 @@ impl TrackerMemory {
             columns: &mut self.columns,
             fresh: &mut self.fresh,
             scratch: &mut self.scratch,
-            vertical: None,
+            vertical: self.vertical.as_mut().map(|v| VerticalStorage {
+                coefficients: &mut v.coefficients,
+                tables: &mut v.tables,
+                fresh: &mut v.fresh,
+            }),
         }
     }
 }

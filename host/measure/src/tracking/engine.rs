@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use rowtone::camera::Timing;
 use rowtone::timeline::{Binner, Curvature, Displacement, Sample};
-use rowtone::tracker::{Config, ConfigError, Counts, Outcome, Tracker};
+use rowtone::tracker::{Axes, Config, ConfigError, Counts, Outcome, Tracker};
 
 use crate::memory::TrackerMemory;
 use rowtone_clip::{Frame, Rect};
@@ -49,14 +49,27 @@ pub struct Engine<'a> {
     tracker: Tracker<'a>,
 }
 
+/// Fewer rows than this know too little of the rows beside them.
+const LEAST_ROWS: usize = 8;
+
+/// The axes that a part of a picture can be measured along: both want some rows.
+pub(super) fn axes_of(part: &Rect, wanted: Axes) -> Axes {
+    if part.height < LEAST_ROWS {
+        Axes::X
+    } else {
+        wanted
+    }
+}
+
 impl<'a> Engine<'a> {
-    /// A tracker on `part` of a picture with this timing and this many bits a pixel.
+    /// A tracker on `part` of a picture with this timing, along these axes; `memory` is for them. `bits`: of a pixel.
     ///
     /// # Errors
     /// [`Failure::Input`] when the part cannot be measured; `name` stands in front.
     pub fn new(
         part: Rect,
         timing: Timing,
+        axes: Axes,
         bits: u8,
         learn_frames: u16,
         memory: &'a mut TrackerMemory,
@@ -68,6 +81,7 @@ impl<'a> Engine<'a> {
         let config = Config {
             rows: part.height as u16,
             bits,
+            axes,
             learn_frames,
             ..Config::new(timing, width)
         };

@@ -36,7 +36,8 @@ fn measure_all(
     groups: Option<Group>,
     to: &mut Outlet<FrameShifts, Ending>,
 ) -> Ending {
-    let memory_for = |part: &Rect| TrackerMemory::new(part.width, part.height);
+    let axes = super::axes_of_both(&part, &feed.camera);
+    let memory_for = |part: &Rect| TrackerMemory::for_axes(part.width, part.height, axes);
     let mut memory = memory_for(&part);
     let mut still_memory = feed.camera.background.as_ref().map(memory_for);
     let (kept, more) = keep_first(feed);
@@ -120,8 +121,11 @@ impl<'a> Lines<'a> {
     ) -> Result<Self, Failure> {
         let camera = &feed.camera;
         let learn = LEARN_FRAMES as u16;
-        let engine =
-            |part, memory| Engine::new(part, camera.timing, camera.bits, learn, memory, &feed.name);
+        let axes = super::axes_of_both(&part, camera);
+        let engine = |part, memory| {
+            let (timing, bits) = (camera.timing, camera.bits);
+            Engine::new(part, timing, axes, bits, learn, memory, &feed.name)
+        };
         let columns = Rect {
             x: region.columns.start,
             width: region.columns.len(),

@@ -13,6 +13,7 @@ mod lines;
 pub mod region;
 
 use rowtone::timeline::{Displacement, Group, Sample};
+use rowtone::tracker::Axes;
 
 pub use background::subtract;
 pub use engine::{Engine, Unmeasured};
@@ -58,12 +59,23 @@ pub struct Shifts {
     pub camera: Camera,
     /// The part of the turned picture that is measured.
     pub part: Rect,
+    /// The axes along which it is measured: along the rows alone where a part has too few of them.
+    pub axes: Axes,
     /// How many frames there are, where the file's length tells.
     pub frames: Option<u64>,
     /// What to call the recording in messages.
     pub name: String,
     /// What was chosen for the user is not told on standard error.
     pub quiet: bool,
+}
+
+/// What both the part and the background can be measured along.
+fn axes_of_both(part: &Rect, camera: &Camera) -> Axes {
+    let axes = engine::axes_of(part, camera.axes);
+    match &camera.background {
+        Some(background) => engine::axes_of(background, axes),
+        None => axes,
+    }
 }
 
 impl Shifts {
@@ -81,15 +93,18 @@ impl Shifts {
         };
         let (outlet, inlet) = ring(BLOCKS * BLOCK_FRAMES / block, block);
         let (frames, name) = (feed.frames, feed.name.clone());
+        let axes = axes_of_both(&part, &camera);
         // Made here and dropped at once: a part that cannot be measured is refused before anything
         // is read.
         for part in [Some(part), camera.background].into_iter().flatten() {
-            let mut memory = TrackerMemory::new(part.width, part.height);
-            Engine::new(part, camera.timing, camera.bits, 1, &mut memory, &name)?;
+            let mut memory = TrackerMemory::for_axes(part.width, part.height, axes);
+            let (timing, bits) = (camera.timing, camera.bits);
+            Engine::new(part, timing, axes, bits, 1, &mut memory, &name)?;
         }
         std::thread::spawn(move || lines::run(feed, part, groups, outlet));
         Ok(Self {
             inlet,
+            axes,
             warning: None,
             camera,
             part,
