@@ -111,7 +111,8 @@ impl Search {
             let dropped = self.drop_weak(samples, fit, model);
             let mut stood = false;
             for i in 0..model.tones.len() {
-                stood |= self.stand(samples, fit, model, i);
+                // Among more tones than there is room for, what a tone leaves is as likely another's.
+                stood |= !outcome.more && self.stand(samples, fit, model, i);
             }
             let notched = self.notch_misfit(samples, fit, model);
             if !exchanged && !dropped && !stood && !notched {

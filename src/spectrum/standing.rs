@@ -38,6 +38,9 @@ const AS_IMAGE: f32 = 1.0;
 /// A further number has to explain so many noise variances more.
 const A_NUMBER: f32 = 4.0;
 
+/// A shape is tried in earnest where it explains this share of what two tones do.
+const NEARLY: f32 = 0.98;
+
 /// What changes within the window by no more than this share of what does not is taken for steady.
 const STEADY: f32 = 0.3;
 
@@ -78,26 +81,18 @@ impl Search {
         model.tabulate(samples);
         let scores = samples.score(model, i, |j| j == i);
         fit.passes = fit.passes.saturating_add(1);
-        let axes = [true, samples.axes > 1];
         let here = samples.grow(&scores, tone.frequency, variance);
         // At an image nothing low fits, and growth has to beat what is left: that alone would not tell.
         if !here.residual.is_more_than_noise() && here.fit.shape.orders() == tone.shape.orders() {
             return false;
         }
-        let all = samples.knowing();
-        let most = (all.len().saturating_sub(1) / 2 + 1).min(ORDERS);
-        let (mut best, mut second): (Option<Multiple>, Option<Multiple>) = (None, None);
-        for at in self.multiples(tone.frequency) {
-            let orders = axes.map(|moves| if moves { most } else { 0 });
-            let ShapeFit { gain, loss, .. } = samples.shape_at(&scores, at, orders, all.clone());
-            let value = gain - loss;
-            if best.is_none_or(|b| value > b.value) {
-                second = best;
-                best = Some(Multiple { at, value });
-            } else if second.is_none_or(|s| value > s.value) {
-                second = Some(Multiple { at, value });
-            }
+        // What leaks from a tone near it that was not found yet is not the same at all times.
+        fit.passes = fit.passes.saturating_add(1);
+        let (even, changing) = samples.steadiness(model, i, variance);
+        if changing > even.max(2.0) {
+            return false;
         }
+        let (best, second) = self.best_multiples(samples, &scores, tone.frequency);
         let Some(best) = best else { return false };
         let grown = samples.grow(&scores, best.at, variance);
         let (at, shape) = if stands(&grown, variance) {
@@ -126,20 +121,47 @@ impl Search {
             return false;
         }
         let axes = shape.orders().map(|o| o > 0);
-        let pair = (shape.orders() != axes.map(usize::from))
-            .then(|| self.best_pair(samples, &scores, tone.frequency, axes));
+        let bends = shape.orders() != axes.map(usize::from);
         fit.refine(samples, &mut trial, STEPS);
         let better =
             model.squares - trial.squares > WORTH * variance && self.sound(samples, &trial);
-        if !better
-            || pair.flatten().is_some_and(|pair| {
-                self.are_two(samples, fit, (model, i), pair, (&trial, axes), variance)
-            })
+        if !better {
+            return false;
+        }
+        // The scores are still those of the tone.
+        if bends
+            && let Some(pair) = self.best_pair(samples, &scores, tone.frequency, axes)
+            && self.are_two(samples, fit, (model, i), pair, (&trial, axes), variance)
         {
             return false;
         }
         *model = trial;
         true
+    }
+
+    /// The frequency that frames cannot tell from this one where a standing shape explains most, and the next.
+    fn best_multiples(
+        &self,
+        samples: &Samples<'_>,
+        scores: &Scores,
+        frequency: Frequency,
+    ) -> (Option<Multiple>, Option<Multiple>) {
+        let axes = [true, samples.axes > 1];
+        let all = samples.knowing();
+        let most = (all.len().saturating_sub(1) / 2 + 1).min(ORDERS);
+        let (mut best, mut second): (Option<Multiple>, Option<Multiple>) = (None, None);
+        for at in self.multiples(frequency) {
+            let orders = axes.map(|moves| if moves { most } else { 0 });
+            let ShapeFit { gain, loss, .. } = samples.shape_at(scores, at, orders, all.clone());
+            let value = gain - loss;
+            if best.is_none_or(|b| value > b.value) {
+                second = best;
+                best = Some(Multiple { at, value });
+            } else if second.is_none_or(|s| value > s.value) {
+                second = Some(Multiple { at, value });
+            }
+        }
+        (best, second)
     }
 
     /// Two rigid tones at the alias frequency that explain most.
@@ -219,20 +241,49 @@ impl Search {
             t.shape.power() > power && self.is_image(samples, newest.frequency, t.frequency)
         });
         let Some(i) = larger else { return };
-        let variance = model.squares / Fit::freedom(samples, model).max(1.0);
-        let mut without = model.clone();
-        without.tones.pop();
-        fit.refine(samples, &mut without, STEPS);
-        if self.stand(samples, fit, &mut without, i)
-            && without.squares
-                < model.squares + A_NUMBER * variance * (numbers(model) - numbers(&without))
-        {
-            *model = without;
-            return;
+        if self.is_shape(samples, fit, model, i) {
+            let variance = model.squares / Fit::freedom(samples, model).max(1.0);
+            let mut without = model.clone();
+            without.tones.pop();
+            fit.refine(samples, &mut without, STEPS);
+            if self.stand(samples, fit, &mut without, i)
+                && without.squares
+                    < model.squares + A_NUMBER * variance * (numbers(model) - numbers(&without))
+            {
+                *model = without;
+                return;
+            }
         }
         if self.is_misfit(samples, fit, model, i, true) {
             self.give_notch(samples, fit, model, i);
         }
+    }
+
+    /// A shape of tone `i` may explain what the newest one does too.
+    fn is_shape(&self, samples: &mut Samples<'_>, fit: &mut Fit, model: &Model, i: usize) -> bool {
+        let last = model.tones.len().saturating_sub(1);
+        let (Some(tone), Some(newest)) = (model.tones.get(i), model.tones.get(last)) else {
+            return false;
+        };
+        let variance = model.squares / Fit::freedom(samples, model).max(1.0);
+        model.tabulate(samples);
+        fit.passes = fit.passes.saturating_add(1);
+        let scores = samples.score(model, i, |j| j == i || j == last);
+        let Some(best) = self.best_multiples(samples, &scores, tone.frequency).0 else {
+            return false;
+        };
+        let grown = samples.grow(&scores, best.at, variance);
+        let fps = self.band.fps.unwrap_or(1.0);
+        let turns = newest.frequency.above(tone.frequency) / fps;
+        let mirrored = (turns - libm::roundf(turns)).abs() * fps * samples.length_s > AS_IMAGE;
+        let at = if mirrored {
+            newest.frequency.mirrored()
+        } else {
+            newest.frequency
+        };
+        let pair = samples.pair_gain(&scores, [tone.frequency, at], [true, samples.axes > 1]);
+        // The pair's frequencies are not quite those of its scores.
+        stands(&grown, variance) && grown.fit.gain > NEARLY * pair
     }
 
     /// At the end of the search: gives a notch to a tone of which something smaller was found at its images, and which leaves

@@ -32,6 +32,9 @@ const TURN: f32 = 0.03;
 /// A tone of which more chi² for each degree of freedom is left tells nothing.
 const MISFIT: f32 = 30.0;
 
+/// A tone of which no more than this is left needs no further order.
+const CLEAN: f32 = 1.3;
+
 /// Line times from this share of the given one to its inverse are looked at.
 const LOWEST: f32 = 0.2;
 
@@ -42,7 +45,7 @@ const NEAR: f32 = 0.03;
 const BESIDE: f32 = 4.0;
 
 /// Steps of a scan a period within the read-out.
-const STEPS: f32 = 8.0;
+const STEPS: f32 = 4.0;
 
 /// What the motion says of the time base.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -190,13 +193,23 @@ impl Look<'_> {
         let slots = samples.knowing().len();
         let most = (slots.saturating_sub(1) / 2 + 1).min(ORDERS);
         let mut best: Option<(f32, f32, f32, f32)> = None;
+        let mut start_hz = None;
         for order in 0..most {
             let around = Around {
                 scores: &scores,
                 orders: [order + 1, if both { order + 1 } else { 0 }],
                 readout_s,
             };
-            let hz = around.highest(samples, self.highest_hz)?;
+            // Where the highest order stands is where the others are to be tried.
+            let hz = match (order, start_hz) {
+                (0, _) => around.highest(samples, self.highest_hz)?,
+                (_, Some(hz)) => hz,
+                (_, None) => {
+                    let orders = [most, if both { most } else { 0 }];
+                    Around { orders, ..around }.highest(samples, self.highest_hz)?
+                }
+            };
+            start_hz = (order > 0).then_some(hz);
             let (within_hz, sd_hz) = around.top(samples, hz, self.variance)?;
             let gain = around.value(samples, within_hz);
             let axes = if both { 2.0 } else { 1.0 };
@@ -218,6 +231,9 @@ impl Look<'_> {
             best = Some((within_hz, gain, sd_hz * sqrtf(each), each));
             if freedom < 2.0 {
                 return None;
+            }
+            if each < CLEAN {
+                break;
             }
         }
         let (within_hz, _, sd_hz, _) = best.filter(|(.., each)| *each < MISFIT)?;
@@ -285,6 +301,7 @@ impl Look<'_> {
 }
 
 /// What a standing shape explains, by the frequency within frames.
+#[derive(Clone, Copy)]
 struct Around<'a> {
     scores: &'a Scores,
     orders: [usize; 2],
