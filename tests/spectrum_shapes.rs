@@ -230,7 +230,14 @@ fn halves_are_two_tones() {
         assert_eq!(sure.len(), 2, "{:?}", report.peaks);
         for hz in [upper_hz, lower_hz] {
             let near = |p: &&&Peak| (f64::from(p.hz) - hz).abs() < 3.0 * f64::from(p.hz_sd);
-            assert!(sure.iter().any(|p| near(&p)), "{hz} Hz: {sure:?}");
+            let peak = sure
+                .iter()
+                .find(near)
+                .unwrap_or_else(|| panic!("{hz} Hz: {sure:?}"));
+            let averaged = hz * TAU * 0.5 * 90e-6 * 5.0;
+            let share = f64::from(peak.amplitude_px) / (0.2 * averaged / averaged.sin());
+            assert!((share - 1.0).abs() < 0.03, "{peak:?}");
+            assert!(!peak.motion.unwrap().rigid);
         }
     }
 }
