@@ -18,7 +18,7 @@ use crate::timeline::{Curvature, Group};
 
 /// Below this share of an amplitude left by exposure and averaging, a tone is not reported: its amplitude would
 /// be guessed.
-const LEAST_ATTENUATION: f32 = 0.15;
+const LEAST_ATTENUATION: f32 = 0.2;
 
 /// A tone of which the amplitude is not known better than this (over its standard deviation) is no peak: it is all
 /// but hidden by a multiple of the frame rate.
