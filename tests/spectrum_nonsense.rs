@@ -2,9 +2,9 @@
 
 use rowtone::camera::Timing;
 use rowtone::pipeline::Analyzer;
-use rowtone::report::Report;
+use rowtone::report::{PeakShape, Report, ShapeRow};
 use rowtone::spectrum::{Config, StaticStorage};
-use rowtone::timeline::{Curvature, Group, Sample, Spread};
+use rowtone::timeline::{Curvature, Group, Sample, Spread, Vertical};
 
 struct Draw(u64);
 
@@ -37,7 +37,31 @@ fn is_sane(report: &Report) -> bool {
                 && p.amplitude_px.is_finite()
                 && p.amplitude_px_sd.is_finite()
                 && p.snr_db.is_finite()
+                && p.motion.is_some_and(|m| {
+                    [
+                        m.x_px,
+                        m.x_px_sd,
+                        m.y_px,
+                        m.y_px_sd,
+                        m.y_phase_rad,
+                        m.across_rad,
+                    ]
+                    .into_iter()
+                    .flatten()
+                    .chain([m.phase_rad])
+                    .all(f32::is_finite)
+                })
         })
+        && report.line_time_us_fit.is_none_or(f32::is_finite)
+}
+
+fn is_sane_shape(shape: &PeakShape) -> bool {
+    let finite = |r: &ShapeRow| {
+        [r.x_px, r.x_phase_rad, r.y_px, r.y_phase_rad]
+            .into_iter()
+            .all(f32::is_finite)
+    };
+    shape.hz.is_finite() && shape.rows.iter().all(finite)
 }
 
 #[test]
@@ -79,7 +103,14 @@ fn nothing_panics_and_all_is_finite() {
             max_passes: 60,
             ..Config::default()
         };
-        let mut analyzer = Analyzer::new(config, group, memory.lend()).unwrap();
+        // Every third knows both axes.
+        let both = seed % 3 == 0;
+        let lent = if both {
+            memory.lend_both()
+        } else {
+            memory.lend()
+        };
+        let mut analyzer = Analyzer::new(config, group, lent).unwrap();
         let (mut frame, mut start_ns) = (draw.next() as u32, draw.of(&[0, -5, i64::MAX / 2]));
         // Half of the seeds are mostly sane, with odd things strewn in.
         let sane = seed % 2 == 0;
@@ -113,11 +144,21 @@ fn nothing_panics_and_all_is_finite() {
                         variance_ns2: if strange { draw.of(&odd) } else { 1e9 },
                         third_ns3: if strange { draw.of(&odd) } else { 1e13 },
                     },
-                    vertical: None,
+                    vertical: (both && !draw.once_in(9)).then(|| {
+                        let mut any = |usual: f32| if strange { draw.of(&odd) } else { usual };
+                        Vertical {
+                            shift_px: any(0.5 - unit),
+                            information_per_px2: any(5e3),
+                            coupling: any(0.3),
+                            coupling_delay_ns: any(1e4),
+                            delay_ns: any(-1e4),
+                        }
+                    }),
                 };
                 if analyzer.push(sample) && !draw.once_in(4) {
                     let report = analyzer.report().expect("a window was ready");
                     assert!(is_sane(&report), "{report:?}");
+                    assert!(analyzer.shapes().iter().all(is_sane_shape));
                 }
             }
         }
