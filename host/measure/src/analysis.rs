@@ -12,6 +12,7 @@ use rowtone::spectrum::Config;
 use rowtone::timeline::{Group, Sample, rows_per_sample};
 
 use crate::memory::SpectrumMemory;
+use crate::silence::Silence;
 use crate::tracking::{FrameShifts, Shifts, Unmeasured};
 use rowtone_clip::Camera;
 use rowtone_failure::Failure;
@@ -147,6 +148,8 @@ pub struct Analysis<'a> {
     window_ns: i64,
     /// When the frames of the window started, ns, and the rows of each that were not measured.
     unmeasured: VecDeque<(i64, Unmeasured)>,
+    /// Frames without samples.
+    silence: Silence,
 }
 
 impl<'a> Analysis<'a> {
@@ -166,6 +169,7 @@ impl<'a> Analysis<'a> {
             analyzer,
             window_ns: plan.config.window_ns,
             unmeasured: VecDeque::new(),
+            silence: Silence::new(plan.config.window_ns, plan.config.hop_ns),
         })
     }
 
@@ -211,6 +215,14 @@ impl<'a> Analysis<'a> {
         }
         self.unmeasured
             .push_back((frame.start_ns, frame.unmeasured));
+        let silent = frame.samples.is_empty();
+        if let Some(report) =
+            self.silence
+                .note_frame(frame.start_ns, silent, self.shifts.camera.fps)
+            && !self.lacks_texture()
+        {
+            self.hand_on(report, on)?;
+        }
         frame
             .samples
             .iter()
@@ -231,16 +243,29 @@ impl<'a> Analysis<'a> {
         Ok(())
     }
 
+    /// Rows of the window that were not measured.
+    fn unmeasured(&self) -> Unmeasured {
+        let mut unmeasured = Unmeasured::default();
+        for (_, of_frame) in &self.unmeasured {
+            unmeasured += *of_frame;
+        }
+        unmeasured
+    }
+
+    /// Nothing could ever be measured, which is no report but a refusal.
+    fn lacks_texture(&self) -> bool {
+        let rows = self.unmeasured.len() * self.shifts.part.height;
+        2 * self.unmeasured().no_texture as usize > rows
+    }
+
     fn hand_on(
         &mut self,
         mut report: Report,
         on: &mut impl FnMut(Event<'_>) -> Result<(), Failure>,
     ) -> Result<(), Failure> {
         // What only the tracker knows.
-        let mut unmeasured = Unmeasured::default();
-        for (_, of_frame) in &self.unmeasured {
-            unmeasured += *of_frame;
-        }
+        let unmeasured = self.unmeasured();
+        self.silence.number(&mut report);
         let rows = (self.unmeasured.len() * self.shifts.part.height).max(1);
         let share = |unmeasured: u32| f64::from(unmeasured) / rows as f64;
         let warnings = &mut report.warnings;
@@ -248,6 +273,12 @@ impl<'a> Analysis<'a> {
         let occluded = share(unmeasured.disturbed) > DISTURBED_SHARE;
         warnings.insert_if(occluded, Warning::Occluded);
         warnings.insert_if(unmeasured.learning > 0, Warning::Relearned);
+        let bad_light = share(unmeasured.unlit) > 0.5;
+        warnings.insert_if(bad_light, Warning::BadLight);
+        let rows_of_frame = self.shifts.part.height as u32;
+        let copies = self.unmeasured.iter();
+        let copies = copies.filter(|(_, f)| 2 * f.repeated > rows_of_frame);
+        warnings.insert_if(copies.count() > 0, Warning::RepeatedFrames);
         let little_texture = share(unmeasured.no_texture) > 0.5;
         warnings.insert_if(little_texture, Warning::LittleTexture);
         let mut shapes = self.analyzer.shapes().to_vec();

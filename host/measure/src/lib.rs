@@ -7,4 +7,5 @@
 pub mod analysis;
 pub mod memory;
 pub mod restore;
+mod silence;
 pub mod tracking;

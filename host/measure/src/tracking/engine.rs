@@ -17,6 +17,10 @@ pub struct Unmeasured {
     pub no_texture: u32,
     /// Rows that something passed through.
     pub disturbed: u32,
+    /// Rows too dark beside their reference.
+    pub unlit: u32,
+    /// Rows of copies of the frame before.
+    pub repeated: u32,
     /// Rows that came while a reference was being learned anew.
     pub learning: u32,
 }
@@ -27,6 +31,8 @@ impl Unmeasured {
         Self {
             no_texture: count(|c| c.no_texture) + count(|c| c.misfit),
             disturbed: count(|c| c.occluded),
+            unlit: count(|c| c.unlit),
+            repeated: count(|c| c.repeated),
             learning: count(|c| c.learning),
         }
     }
@@ -36,6 +42,8 @@ impl std::ops::AddAssign for Unmeasured {
     fn add_assign(&mut self, other: Self) {
         self.no_texture += other.no_texture;
         self.disturbed += other.disturbed;
+        self.unlit += other.unlit;
+        self.repeated += other.repeated;
         self.learning += other.learning;
     }
 }
