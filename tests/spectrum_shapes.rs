@@ -327,3 +327,13 @@ fn edges_that_lean_one_way_tell_the_motion_across_them() {
         "{peak:?}"
     );
 }
+
+/// Upright edges tell x, and nothing of y.
+#[test]
+fn upright_edges_tell_x_alone() {
+    let report = leaning(6, 0.0, |t| [0.2 * (TAU * 131.9 * t).sin(), 0.1]);
+    let peak = only(&report, 0.0, "upright edges");
+    let motion = peak.motion.unwrap();
+    assert_eq!(motion.x_px, Some(peak.amplitude_px));
+    assert!(motion.y_px.is_none() && motion.across_rad.is_none());
+}

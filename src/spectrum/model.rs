@@ -25,6 +25,9 @@ pub(crate) const POWERS: usize = 3;
 /// A sample is skewed where its time is off its frame's and slot's by more than this many steps.
 pub(crate) const NO_SKEW: u16 = 16;
 
+/// Edges that lean by no more than this, rad, are upright.
+const UPRIGHT: f32 = 2e-3;
+
 /// Where one direction knows less than this share of what the other does, all edges lean one way.
 const LEAST_RATIO: f32 = 3e-3;
 
@@ -211,8 +214,11 @@ impl Samples<'_> {
         if x < 0.0 {
             (x, y) = (-x, -y);
         }
-        self.lean = Some([x / size, y / size]);
         self.axes = 1;
+        // Upright edges, or samples that know x alone, tell x and nothing else.
+        if y.abs() > UPRIGHT * size {
+            self.lean = Some([x / size, y / size]);
+        }
     }
 
     /// Fills table row `k` for `tone`.

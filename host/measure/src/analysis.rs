@@ -10,6 +10,7 @@ use rowtone::pipeline::Analyzer;
 use rowtone::report::{PeakShape, Report, Warning};
 use rowtone::spectrum::Config;
 use rowtone::timeline::{Group, Sample, rows_per_sample};
+use rowtone::tracker::Axes;
 
 use crate::memory::SpectrumMemory;
 use crate::silence::Silence;
@@ -65,6 +66,7 @@ impl Default for Settings {
 pub struct Plan {
     config: Config,
     group: Group,
+    axes: Axes,
     fps: f64,
     window_s: f64,
 }
@@ -103,6 +105,7 @@ impl Plan {
         Ok(Self {
             config,
             group,
+            axes: camera.axes,
             fps: camera.fps,
             window_s: settings.window_s,
         })
@@ -115,7 +118,11 @@ impl Plan {
 
     /// The memory that the analysis borrows.
     pub fn memory(&self) -> SpectrumMemory {
-        SpectrumMemory::new(self.group, self.window_s, self.fps)
+        let memory = match self.axes {
+            Axes::X => SpectrumMemory::new,
+            Axes::Xy => SpectrumMemory::along_both,
+        };
+        memory(self.group, self.window_s, self.fps)
     }
 
     /// Highest frequency that can be reported, Hz.
