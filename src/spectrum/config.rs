@@ -26,7 +26,8 @@ pub struct Config {
     /// Share of windows of pure noise that report a peak. Default 1 in 1000.
     pub false_alarm: f32,
     /// Most passes over a window's samples, at least 20: bounds the time a window takes. A tone costs about 10, near a
-    /// multiple of the frame rate or with changing frequency up to 80. Default 1000.
+    /// multiple of the frame rate or with changing frequency up to 80. Where the noise is not white, half as many again.
+    /// Default 1000.
     pub max_passes: u32,
     /// Scale of the picture, µm a pixel.
     pub um_per_px: Option<f32>,

@@ -1,10 +1,12 @@
 //! The computing side: a window in, tones out.
 
 use super::config::{Config, ConfigError};
-use super::detect::Band;
 use super::fit::{Fit, Model};
+use super::judge::Noise;
 use super::load::Loaded;
 use super::model::{Samples, TABLE_ROWS};
+use super::periodogram::Band;
+use super::residual::Residual;
 use super::search::Search;
 use super::storage::{EstimatorStorage, MAX_GRID};
 use super::tones::{Shapes, Telling, Tones};
@@ -21,6 +23,9 @@ pub struct Estimator<'a> {
     storage: EstimatorStorage<'a>,
     fit: Fit,
     model: Model,
+    /// What explains the samples as if the noise were white.
+    plain: Model,
+    noise: [Noise; 2],
     mark: WindowMark,
     loaded: Loaded,
     shapes: Shapes,
@@ -41,6 +46,8 @@ impl<'a> Estimator<'a> {
             storage,
             fit: Fit::new(),
             model: Model::new(0),
+            plain: Model::new(0),
+            noise: [Noise::new(), Noise::new()],
             mark: WindowMark::default(),
             loaded: Loaded::default(),
             shapes: Shapes::new(),
@@ -167,7 +174,14 @@ impl<'a> Estimator<'a> {
             most_passes: self.config.max_passes,
         };
         let (mut samples, grid) = view(&mut self.storage, &l, &self.group);
-        let outcome = search.run(&mut samples, &mut self.fit, &mut self.model, grid);
+        let mut residual = Residual::new(&samples, band, grid, &mut self.noise);
+        let outcome = search.run(
+            &mut samples,
+            &mut self.fit,
+            &mut self.model,
+            &mut self.plain,
+            &mut residual,
+        );
         let mut tones = Telling {
             config: &self.config,
             group: &self.group,
@@ -176,7 +190,13 @@ impl<'a> Estimator<'a> {
             curvature: self.mark.curvature,
             since_begin_ns: since(l.zero_ns, self.mark.origin_ns),
         }
-        .tones(&mut samples, &mut self.fit, &self.model, &mut self.shapes);
+        .tones(
+            &mut samples,
+            &mut self.fit,
+            (&self.model, &self.plain),
+            &mut residual,
+            &mut self.shapes,
+        );
         tones.more |= outcome.more;
         tones
     }

@@ -1,18 +1,20 @@
 //! One more tone at a time, until the next is no more than noise would be.
 
 use super::alarm;
-use super::detect::{self, Band, Candidate};
+use super::detect::{self, Candidate, Candidates};
 use super::fit::{Fit, Model, drift_powers};
 use super::largest::{direction, largest};
 use super::model::Samples;
+use super::periodogram::Band;
 use super::phase::Frequency;
+use super::residual::Residual;
 use super::tone::Tone;
 
 /// Refinement steps of a trial and of the final fit.
-const STEPS: u32 = 12;
+pub(super) const STEPS: u32 = 12;
 
 /// Tones nearer than this are one, turns a window length.
-const CLOSEST: f32 = 0.5;
+pub(super) const CLOSEST: f32 = 0.5;
 
 /// Where the ghosts of a tone are, in frame rates from it.
 const GHOSTS: [f32; 4] = [1.0, -1.0, 2.0, -2.0];
@@ -39,7 +41,7 @@ const NEARER: [f32; 4] = [0.15, -0.15, 0.04, -0.04];
 const LEAST_KEPT: f32 = 3e-5;
 
 /// A tone this near a larger one may come of its changing within the window, turns a window length.
-const BESIDE: f32 = 6.0;
+pub(super) const BESIDE: f32 = 6.0;
 
 /// Fastest change of frequency tried, turns a window length squared.
 const MOST_CHIRP: f32 = 4.0;
@@ -55,14 +57,20 @@ const CHIRPS: [f32; 7] = [
     -MOST_CHIRP,
 ];
 
+/// Tones this near each other, turns a window length, are near enough to be noise in a few cells.
+pub(super) const PAIR: f32 = 8.0;
+
+/// So many tones are found before what is left is given up as noise.
+const FEW_TONES: usize = 3;
+
 /// Where samples know both axes: how much of the false alarms is for tones along x, so that next to nothing is lost of those.
 const ALONG_X: f32 = 0.9;
 
-/// Places at which nothing could be put that are remembered.
-const MOST_BARRED: usize = 8;
+/// Places at which nothing could be put, or where noise explains what is there, that are remembered.
+const MOST_BARRED: usize = 12;
 
 /// Where the residual holds more than noise but no tone can be put: too near another, or slower than the window can tell.
-struct Barred {
+pub(super) struct Barred {
     places: heapless::Vec<Candidate, MOST_BARRED>,
     /// Power that ghosts may have over that of where they come from.
     ghost: f32,
@@ -85,39 +93,29 @@ pub(crate) struct Outcome {
 }
 
 impl Search {
-    /// Fits tones to the samples, into `model`.
+    /// Fits tones to the samples, into `model`; into `plain` as if the noise were white, unless that is hopeless.
     pub(crate) fn run(
         &self,
         samples: &mut Samples<'_>,
         fit: &mut Fit,
         model: &mut Model,
-        grid: &mut [f32],
+        plain: &mut Model,
+        residual: &mut Residual<'_>,
     ) -> Outcome {
-        *model = Model::new(drift_powers(samples));
         fit.passes = 0;
-        fit.refine(samples, model, 2);
-        let mut outcome = Outcome::default();
-        // Each round adds, exchanges or drops a tone; the bound only guards against going round in circles.
-        for _ in 0..3 * self.most_tones + 3 {
-            if self.add(samples, fit, model, grid, &mut outcome) {
-                self.claim(samples, fit, model);
-                self.stand(samples, fit, model, model.tones.len().saturating_sub(1));
-                continue;
-            }
-            if self.tired(fit) {
-                break;
-            }
-            let exchanged = self.exchange(samples, fit, model);
-            let dropped = self.drop_weak(samples, fit, model);
-            let mut stood = false;
-            for i in 0..model.tones.len() {
-                // Among more tones than there is room for, what a tone leaves is as likely another's.
-                stood |= !outcome.more && self.stand(samples, fit, model, i);
-            }
-            let notched = self.notch_misfit(samples, fit, model);
-            if !exchanged && !dropped && !stood && !notched {
-                break;
-            }
+        // Where tones explain all but white noise, no floor is asked for.
+        let mut outcome = self.search(samples, fit, model, residual);
+        residual.look_all(samples, model);
+        let hopeless = residual.is_hopeless();
+        plain.clone_from(model);
+        if !residual.is_white() || self.crowded(samples, model) {
+            residual.begin_again();
+            let rest = self.most_passes.saturating_sub(fit.passes);
+            let again = Self {
+                most_passes: fit.passes + rest.max(self.most_passes / 2),
+                ..*self
+            };
+            outcome = again.search(samples, fit, model, residual);
         }
         fit.refine(samples, model, STEPS);
         if model.has_notches() {
@@ -129,7 +127,58 @@ impl Search {
         if samples.frames < FEW_FRAMES {
             self.drop_drift(samples, fit, model);
         }
+        if hopeless || !residual.is_strict() {
+            plain.clone_from(model);
+        }
         outcome
+    }
+
+    /// Adds, exchanges and drops tones while that explains more, from none on.
+    fn search(
+        &self,
+        samples: &mut Samples<'_>,
+        fit: &mut Fit,
+        model: &mut Model,
+        residual: &mut Residual<'_>,
+    ) -> Outcome {
+        let mut outcome = Outcome::default();
+        *model = Model::new(drift_powers(samples));
+        fit.refine(samples, model, 2);
+        // Each round adds, exchanges or drops a tone; the bound only guards against going round in circles.
+        for _ in 0..3 * self.most_tones + 3 {
+            if self.add(samples, fit, model, residual, &mut outcome) {
+                self.claim(samples, fit, model);
+                self.stand(samples, fit, model, model.tones.len().saturating_sub(1));
+                residual.forget();
+                continue;
+            }
+            if self.tired(fit) || residual.is_hopeless() {
+                break;
+            }
+            let exchanged = self.exchange(samples, fit, model);
+            let dropped = self.drop_weak(samples, fit, model, residual);
+            let mut stood = false;
+            for i in 0..model.tones.len() {
+                // Among more tones than there is room for, what a tone leaves is as likely another's.
+                stood |= !outcome.more && self.stand(samples, fit, model, i);
+            }
+            let notched = self.notch_misfit(samples, fit, model);
+            if !exchanged && !dropped && !stood && !notched {
+                break;
+            }
+            residual.forget();
+        }
+        outcome
+    }
+
+    /// Some tones are so near each other that together they may be noise in a few cells.
+    fn crowded(&self, samples: &Samples<'_>, model: &Model) -> bool {
+        let tones = model.tones.iter().enumerate();
+        let near =
+            |a: &Tone, b: &Tone| a.frequency.above(b.frequency).abs() * samples.length_s < PAIR;
+        tones
+            .into_iter()
+            .any(|(i, a)| model.tones.iter().take(i).any(|b| near(a, b)))
     }
 
     /// In few frames a drift and a tone near a multiple of the frame rate are hard to tell apart: a drift that
@@ -155,15 +204,24 @@ impl Search {
         fit.passes.saturating_add(STEPS) > self.most_passes
     }
 
-    /// Share by which a tone along `axis` must lower the sum of squares.
-    fn threshold(&self, samples: &Samples<'_>, model: &Model, axis: usize) -> f32 {
-        // T_e = √(4π·var t) = 1.023 T for samples spread evenly.
-        let widths = (self.band.highest_hz - self.band.lowest_hz) * samples.length_s * 1.023;
+    /// T_e = √(4π·var t) = 1.023 T for samples spread evenly, times the band.
+    fn widths(&self, samples: &Samples<'_>) -> f32 {
+        (self.band.highest_hz - self.band.lowest_hz) * samples.length_s * 1.023
+    }
+
+    /// The share of windows of noise that may report a tone along `axis`, and in how many widths of a peak it may be.
+    pub(super) fn alarms(&self, samples: &Samples<'_>, axis: usize) -> (f32, f32) {
         let alarms = match (samples.axes, axis) {
             (1, _) => self.false_alarm,
             (_, 0) => ALONG_X * self.false_alarm,
             _ => (1.0 - ALONG_X) * self.false_alarm,
         };
+        (alarms, self.widths(samples))
+    }
+
+    /// Share by which a tone along `axis` must lower the sum of squares of white noise.
+    fn threshold(&self, samples: &Samples<'_>, model: &Model, axis: usize) -> f32 {
+        let (alarms, widths) = self.alarms(samples, axis);
         alarm::threshold(alarms, widths, Fit::freedom(samples, model) - 3.0)
     }
 
@@ -172,27 +230,29 @@ impl Search {
         samples: &mut Samples<'_>,
         fit: &mut Fit,
         model: &mut Model,
-        grid: &mut [f32],
+        residual: &mut Residual<'_>,
         outcome: &mut Outcome,
     ) -> bool {
         if Fit::freedom(samples, model) < 6.0 {
             return false;
         }
-        let length_s = samples.length_s;
         let mut barred = Barred {
             places: heapless::Vec::new(),
             ghost: UNLIKE_A_TONE * self.ghost(samples),
         };
         loop {
-            let candidates = detect::candidates(samples, model, grid, self.band, |candidate| {
-                self.is_barred(length_s, &barred, candidate)
-                    || self.is_notched(length_s, model, candidate.frequency)
-            });
+            let candidates = self.candidates(samples, model, &barred, residual);
             let Some(first) = candidates.first().copied() else {
-                return false;
+                return !residual.takes_white()
+                    && self.spread_out(samples, fit, model, residual, &barred);
             };
             let share = self.threshold(samples, model, first.axis);
-            if first.gain < 0.4 * share * model.squares {
+            if self.is_noise(model, first, residual) {
+                residual.give_up();
+                return false;
+            }
+            let white = residual.takes_white();
+            if white && first.gain < 0.4 * share * model.squares {
                 return false;
             }
             if model.tones.len() >= self.most_tones || self.tired(fit) {
@@ -202,22 +262,32 @@ impl Search {
             let before = barred.places.len();
             let mut best = model.clone();
             if self.put_best(samples, fit, model, &mut best, &candidates, &mut barred) {
-                if model.squares - best.squares <= share * best.squares {
-                    return false;
-                }
                 if model.squares - best.squares < 2.0 * share * best.squares {
                     // Tones near each other are slow to settle: what they gain by it is not the new one's.
-                    fit.refine(samples, model, STEPS);
-                    if model.squares - best.squares <= share * best.squares {
+                    if white && model.squares - best.squares <= share * best.squares {
                         return false;
                     }
+                    fit.refine(samples, model, STEPS);
                 }
-                if let Some(newest) = best.tones.last() {
-                    let at = newest.frequency;
-                    self.modulate(samples, fit, model, Some(&mut best), at, 0.0);
+                let accepted = if white {
+                    model.squares - best.squares > share * best.squares
+                } else {
+                    self.stands_out(samples, fit, model, &mut best, residual)
+                        || self.changes(samples, fit, model, &mut best, residual)
+                };
+                if accepted {
+                    if let Some(newest) = best.tones.last() {
+                        let at = newest.frequency;
+                        self.modulate(samples, fit, model, Some(&mut best), at, 0.0);
+                    }
+                    *model = best;
+                    return true;
                 }
-                *model = best;
-                return true;
+                if white || residual.refuse() || barred.places.push(first).is_err() {
+                    return false;
+                }
+                residual.forget();
+                continue;
             }
             // What no further tone explains may come of one's changing.
             if before == 0 && self.modulate(samples, fit, model, None, first.frequency, share) {
@@ -228,6 +298,43 @@ impl Search {
                 return false;
             }
         }
+    }
+
+    /// The largest peaks of the residual along any axis that are worth a fit.
+    fn candidates(
+        &self,
+        samples: &mut Samples<'_>,
+        model: &Model,
+        barred: &Barred,
+        residual: &mut Residual<'_>,
+    ) -> Candidates {
+        let mut found = Candidates::new();
+        let length_s = samples.length_s;
+        let white = !residual.is_strict();
+        for axis in (0..samples.axes).rev() {
+            residual.look(samples, model, axis);
+            let Some(p) = residual.periodogram() else {
+                continue;
+            };
+            let noise = residual.noise(axis);
+            detect::candidates(samples, &p, &mut found, |c| {
+                self.is_barred(length_s, barred, c)
+                    || self.is_notched(length_s, model, c.frequency)
+                    || !(white || noise.is_worth_a_fit(c.frequency.hz(), 0.5 * c.gain, &p))
+            });
+        }
+        found
+    }
+
+    /// Some tones have been found and the strongest of what is left does not stand out of it: it is not tones.
+    fn is_noise(&self, model: &Model, strongest: Candidate, residual: &Residual<'_>) -> bool {
+        let noise = residual.noise(strongest.axis);
+        let early = model.tones.len() < FEW_TONES || residual.is_strict() || noise.is_white();
+        let p = residual.periodogram().filter(|p| p.axis == strongest.axis);
+        !early
+            && p.is_some_and(|p| {
+                !noise.is_worth_a_fit(strongest.frequency.hz(), 0.5 * strongest.gain, &p)
+            })
     }
 
     /// Makes `best` the model with the candidate that explains most, as a further tone, and says whether there is one. Those
@@ -277,7 +384,7 @@ impl Search {
 
     /// Nothing can be put at this place, or it is no more than a ghost of what is at such a place: a multiple of the frame
     /// rate from it or from its mirror image.
-    fn is_barred(&self, length_s: f32, barred: &Barred, candidate: Candidate) -> bool {
+    pub(super) fn is_barred(&self, length_s: f32, barred: &Barred, candidate: Candidate) -> bool {
         let at = candidate.frequency;
         barred.places.iter().any(|place| {
             let apart = [at.above(place.frequency), at.hz() + place.frequency.hz()];
@@ -331,7 +438,7 @@ impl Search {
     }
 
     /// Puts a further tone into `model`; it may be there.
-    fn put(
+    pub(super) fn put(
         &self,
         samples: &mut Samples<'_>,
         fit: &mut Fit,
@@ -516,23 +623,38 @@ impl Search {
     }
 
     /// Drops tones that no longer lower the sum of squares enough beside the others.
-    fn drop_weak(&self, samples: &mut Samples<'_>, fit: &mut Fit, model: &mut Model) -> bool {
+    fn drop_weak(
+        &self,
+        samples: &mut Samples<'_>,
+        fit: &mut Fit,
+        model: &mut Model,
+        residual: &mut Residual<'_>,
+    ) -> bool {
+        if residual.is_strict() {
+            residual.look_all(samples, model);
+        }
         let regressors = fit.weigh(samples, model);
-        let mut weakest: Option<(usize, f32, f32)> = None;
+        let mut weakest: Option<(usize, f32)> = None;
         for (i, tone) in model.tones.iter().enumerate().filter(|(_, t)| !t.frozen) {
             let (eta, orbit) = largest(&tone.shape);
             let along = direction(eta, orbit.towards);
             let unit = fit.deviation(&regressors, i, samples.length_s, &along);
             let over = orbit.semi_major_px / unit.amplitude_px;
-            let gain = over * over;
             let axis = usize::from(tone.shape.orders()[0] == 0);
-            let share = self.threshold(samples, model, axis);
-            if weakest.is_none_or(|(_, g, least)| gain * least < g * share) {
-                weakest = Some((i, gain, share));
+            let needed = if residual.takes_white() {
+                self.threshold(samples, model, axis) * model.squares
+            } else {
+                let alarms = self.alarms(samples, axis);
+                let noise = residual.noise(axis);
+                noise.needed(tone.frequency.hz(), alarms, None)
+            };
+            let gain = over * over / needed;
+            if weakest.is_none_or(|(_, g)| gain < g) {
+                weakest = Some((i, gain));
             }
         }
         match weakest {
-            Some((i, gain, share)) if gain < 0.7 * share * model.squares => {
+            Some((i, gain)) if gain < 0.7 => {
                 model.tones.remove(i);
                 fit.refine(samples, model, STEPS);
                 true

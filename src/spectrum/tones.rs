@@ -3,12 +3,13 @@
 use num_complex::Complex32 as Complex;
 
 use super::config::Config;
-use super::detect::Band;
 use super::fit::{Fit, Model};
 use super::gram::Regressors;
 use super::largest::{Orbit, direction, largest};
 use super::model::Samples;
 use super::motion::{Bands, Scale, believe_bands, over_rows};
+use super::periodogram::Band;
+use super::residual::Residual;
 use super::smear::Smear;
 use super::timebase::Look;
 use super::tone::Tone;
@@ -110,7 +111,8 @@ impl Telling<'_> {
         &self,
         samples: &mut Samples<'_>,
         fit: &mut Fit,
-        model: &Model,
+        (model, plain): (&Model, &Model),
+        residual: &mut Residual<'_>,
         shapes: &mut Shapes,
     ) -> Tones {
         let mut tones = Tones::nothing(self.fps);
@@ -124,19 +126,21 @@ impl Telling<'_> {
         let smear = Smear::of(self.group, self.curvature, model);
         let mut list = List::new();
         shapes.clear();
-        self.tell(samples, fit, (model, variance), &smear, (&mut list, shapes));
+        residual.look_all(samples, model);
+        self.tell(samples, fit, (model, residual), &smear, (&mut list, shapes));
         if model.has_notches() {
             let mut strong = model.without_notches();
             fit.evaluate(samples, &mut strong);
             self.tell(
                 samples,
                 fit,
-                (&strong, variance),
+                (&strong, residual),
                 &smear,
                 (&mut list, shapes),
             );
         }
-        self.check_time_base(samples, fit, (model, variance), &mut tones);
+        let unexplained = plain.squares / Fit::freedom(samples, plain).max(1.0);
+        self.check_time_base(samples, fit, (plain, unexplained), &mut tones);
         largest_first(&mut list);
         self.doubt_images(samples.length_s, &mut list);
         tones.more = list.len() > self.config.max_peaks;
@@ -180,16 +184,15 @@ impl Telling<'_> {
         tones.line_time_us_fit = base.ratio.map(|ratio| ratio * line_us);
     }
 
-    /// The free tones of `model`, with the noise's variance.
+    /// The free tones of `model`, with the noise at them.
     fn tell(
         &self,
         samples: &mut Samples<'_>,
         fit: &mut Fit,
-        (model, variance): (&Model, f32),
+        (model, residual): (&Model, &Residual<'_>),
         smear: &Smear<'_>,
         (list, shapes): (&mut List, &mut Shapes),
     ) {
-        let noise = sqrtf(variance);
         let (low, high) = self.asked_hz();
         let regressors = fit.weigh(samples, model);
         for (i, tone) in model.tones.iter().enumerate().filter(|(_, t)| !t.frozen) {
@@ -198,6 +201,9 @@ impl Telling<'_> {
             if !(low..=high).contains(&hz) || attenuation < LEAST_ATTENUATION {
                 continue;
             }
+            let axis = usize::from(tone.shape.orders()[0] == 0);
+            let variance = residual.variance(hz, axis);
+            let noise = sqrtf(variance);
             let told = self.told(samples, fit, &regressors, (model, i), variance);
             let smeared = smear.correction(told.semi_major_px / attenuation, hz);
             let turned = if self.group.exposed(hz) < 0.0 {

@@ -7,7 +7,7 @@ use rowtone_failure::Failure;
 use rowtone_lab::calibrations;
 use rowtone_lab::line_scenes::{case, region, slips, table as line_table};
 use rowtone_lab::spectrum_scenes::score::Score;
-use rowtone_lab::spectrum_scenes::{cameras, days, few, table};
+use rowtone_lab::spectrum_scenes::{cameras, days, few, noise, table};
 
 /// Options of `rowtone sweep`.
 #[derive(Debug, clap::Args)]
@@ -25,6 +25,8 @@ enum What {
     Spectrum(Spectrum),
     /// Whole simulated recordings with known tones, from the pictures to the report: the same table
     Cameras(Cameras),
+    /// Noise that is not white and tones that are not steady: what is called a tone, and what is found
+    Noise(Noise),
     /// The thesis's test: tones of 75 to 325 Hz in a handful of frames at 120 fps, with their bounds
     FewFrames(FewFrames),
     /// Days of samples at 50 000 lines a second through one analyzer: drift, growth, wrapped counters
@@ -139,6 +141,30 @@ struct Spectrum {
     failures: bool,
 }
 
+/// Options of `rowtone sweep noise`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Random cameras (25-200 fps, 1-45 % blank time, lost frames, 50 us jitter), 0.015 px a sample. Columns: windows;
+those with a sure peak that is no tone; those in which the tone is found, and in which nothing else is; rms and
+largest error of its frequency; rms errors of frequency and amplitude over their stated deviations.
+
+Example:
+  rowtone sweep noise --windows 200 --only '90-110 Hz'")]
+struct Noise {
+    /// Windows of each kind
+    #[arg(long, default_value_t = 200)]
+    windows: u64,
+    /// Which series of windows
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Only kinds with this in their name
+    #[arg(long, value_name = "TEXT", default_value = "")]
+    only: String,
+    /// Also lists the windows in which a tone was missed or invented
+    #[arg(long)]
+    failures: bool,
+}
+
 /// Options of `rowtone sweep cameras`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
@@ -205,6 +231,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     match &args.what {
         What::Spectrum(options) => spectrum(options),
         What::Cameras(options) => camera_scenes(options),
+        What::Noise(options) => noises(options),
         What::FewFrames(options) => few_frames(options),
         What::Days(options) => many_days(options),
         What::Calibration(options) => calibration(options),
@@ -272,6 +299,21 @@ fn spectrum(options: &Spectrum) -> Result<(), Failure> {
     for kind in table::kinds() {
         let score = Score::of(&kind.ranges, options.seed, options.scenes);
         row(kind.name, &score, options.failures)?;
+    }
+    Ok(())
+}
+
+fn noises(options: &Noise) -> Result<(), Failure> {
+    let mut out = Out::default();
+    out.line(&noise::head())?;
+    for kind in noise::kinds() {
+        if kind.name.contains(&options.only) {
+            let outcome = noise::Outcome::of(&kind, options.seed, options.windows);
+            out.line(&noise::row(&kind, &outcome))?;
+            for failure in outcome.failures.iter().filter(|_| options.failures) {
+                out.line(&format!("    {failure}"))?;
+            }
+        }
     }
     Ok(())
 }

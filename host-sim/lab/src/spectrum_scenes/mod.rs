@@ -9,6 +9,7 @@ pub mod bound;
 pub mod cameras;
 pub mod days;
 pub mod few;
+pub mod noise;
 pub mod scene;
 pub mod score;
 pub mod table;

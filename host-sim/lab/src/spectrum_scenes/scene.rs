@@ -111,7 +111,7 @@ impl Draw {
         range[0] + (range[1] - range[0]) * self.unit()
     }
 
-    fn normal(&mut self) -> f64 {
+    pub(super) fn normal(&mut self) -> f64 {
         StandardNormal.sample(&mut self.0)
     }
 
