@@ -12,13 +12,13 @@ use crate::timeline::{Curvature, Group, Sample, Spread, Vertical};
 pub struct Collector<'a> {
     window_ns: i64,
     hop_ns: i64,
-    group: Group,
-    ring: SampleBuffer<'a>,
+    pub(super) group: Group,
+    pub(super) ring: SampleBuffer<'a>,
     /// Frames the ring holds.
-    capacity: usize,
+    pub(super) capacity: usize,
     /// Column of the oldest frame, and how many there are.
     oldest: usize,
-    held: usize,
+    pub(super) held: usize,
     /// The sample that showed a window to be complete; it belongs to the next.
     pending: Option<Sample>,
     origin_ns: Option<i64>,
@@ -162,7 +162,7 @@ impl<'a> Collector<'a> {
         self.dropped_windows
     }
 
-    fn column(&self, i: usize) -> usize {
+    pub(super) fn column(&self, i: usize) -> usize {
         (self.oldest + i) % self.capacity
     }
 
@@ -286,6 +286,7 @@ impl<'a> Collector<'a> {
         if frames == 0 {
             return false;
         }
+        self.leave_out_elsewhere(first);
         let numbers = b.number.wrapping_sub(a.number);
         let lost = (numbers as usize).saturating_add(1).saturating_sub(frames);
         let mut lines = 0_u32;

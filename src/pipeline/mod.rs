@@ -8,6 +8,7 @@
 //! A window is made of whole frames: those whose first row starts within it.
 
 mod collector;
+mod elsewhere;
 mod reporter;
 
 pub use collector::Collector;
