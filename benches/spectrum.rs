@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use rowtone::camera::Timing;
-use rowtone::pipeline::Analyzer;
+use rowtone::pipeline::ReportSide;
 use rowtone::spectrum::{Config, StaticStorage};
 use rowtone::timeline::{Group, Sample, Spread};
 
@@ -70,16 +70,16 @@ impl Window {
                 window_ns,
                 ..Config::default()
             };
-            let mut analyzer =
-                Analyzer::new(config, self.group, memory.lend()).expect("the memory fits");
+            let mut reports =
+                ReportSide::new(config, self.group, memory.lend()).expect("the memory fits");
             for sample in &self.samples {
-                analyzer.push(*sample);
+                reports.push(*sample);
             }
             let start = Instant::now();
-            let report = analyzer.finish();
+            let report = reports.finish();
             total += start.elapsed();
             assert!(report.is_some());
-            passes = analyzer.passes();
+            passes = reports.passes();
         }
         (total, passes)
     }

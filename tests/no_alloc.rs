@@ -11,11 +11,11 @@ use rowtone::kernel::Kernel;
 use rowtone::link::Link;
 use rowtone::link::settings::Wire;
 use rowtone::link::settings::store::Nowhere;
-use rowtone::pipeline::{Analyzer, Collector, Reporter};
+use rowtone::pipeline::{Collector, Pipeline, Reporter};
 use rowtone::report::Report;
 use rowtone::spectrum;
-use rowtone::timeline::{Binner, Group};
-use rowtone::tracker::{self, Config, Outcome, Tracker};
+use rowtone::timeline::Group;
+use rowtone::tracker::{self, Config, Outcome};
 use rowtone::wire::{Message, binary, text};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
@@ -116,11 +116,10 @@ fn nothing_is_allocated_from_lines_to_bytes() {
                 kernel,
                 ..Config::new(timing, WIDTH as u16)
             };
-            let mut tracker = Tracker::new(config, picture.lend()).unwrap();
             let group = Group::new(timing, 1).unwrap();
-            let mut binner = Binner::new(group);
-            let config = spectrum::Config::default();
-            let mut analyzer = Analyzer::new(config, group, spectrum.lend()).unwrap();
+            let (lines, config) = (config, spectrum::Config::default());
+            let mut whole =
+                Pipeline::new(lines, group, config, picture.lend(), spectrum.lend()).unwrap();
             let storage = halves.lend();
             let mut collector = Collector::new(&config, group, storage.collected).unwrap();
             let mut reporter = Reporter::new(config, group, storage.estimator).unwrap();
@@ -144,17 +143,23 @@ fn nothing_is_allocated_from_lines_to_bytes() {
                         start_ns,
                         pixels,
                     };
-                    let Outcome::Measured(displacement) = tracker.push(&line) else {
+                    // Row by row, and in one go.
+                    let reading = if frame % 2 == 0 {
+                        let Outcome::Measured(displacement) = whole.lines.push_row(&line) else {
+                            continue;
+                        };
+                        whole.lines.bin(displacement)
+                    } else {
+                        whole.lines.push(&line)
+                    };
+                    let Some(reading) = reading else {
                         continue;
                     };
-                    let Some(sample) = binner.push(displacement) else {
-                        continue;
-                    };
-                    if collector.push(sample) && collector.hand_over(&mut reporter) {
+                    if collector.push(reading) && collector.hand_over(&mut reporter) {
                         let _ = reporter.report();
                     }
-                    if analyzer.push(sample)
-                        && let Some(report) = analyzer.report()
+                    if whole.reports.push(reading)
+                        && let Some(report) = whole.reports.report()
                     {
                         reports += 1;
                         bytes += there_and_back(&report);
@@ -163,14 +168,11 @@ fn nothing_is_allocated_from_lines_to_bytes() {
                     }
                 }
             }
-            binner.finish().into_iter().for_each(|s| {
-                let _ = analyzer.push(s);
-            });
-            if let Some(report) = analyzer.finish() {
+            for report in whole.finish().into_iter().flatten() {
                 reports += 1;
                 bytes += there_and_back(&report);
             }
-            (tracker.counts(), reports, bytes)
+            (whole.lines.counts(), reports, bytes)
         });
         assert_eq!(calls, 0, "{kernel:?}");
         // The chain did go through all of its states.

@@ -6,11 +6,11 @@ use proptest::{collection, prelude::*, sample};
 use rowtone::camera::RawFormat;
 use rowtone::camera::{Line, Pixels, Timing};
 use rowtone::kernel::Kernel;
-use rowtone::pipeline::Analyzer;
+use rowtone::pipeline::{LineSide, ReportSide};
 use rowtone::reference::band::Level;
 use rowtone::spectrum;
 use rowtone::timeline::{Binner, Displacement, Group};
-use rowtone::tracker::{self, Axes, Config, Outcome, Tracker};
+use rowtone::tracker::{self, Axes, Config, Outcome};
 use rowtone::wire::{Message, binary, text};
 
 /// A small fast generator (xorshift64*, Vigna 2016).
@@ -124,13 +124,12 @@ proptest! {
         let lent = memory.lend().with_vertical(vertical.lend());
         lent.mask.iter_mut().zip(columns).for_each(|(weight, given)| *weight = given);
         let mut room = vec![0; room];
-        let mut tracker = Tracker::new(config, lent).unwrap().with_line_room(&mut room);
         let timing = config.timing;
         let group = Group::new(timing, rows_per_sample.min(timing.rows())).unwrap();
-        let mut binner = Binner::new(group);
         let mut storage = Box::new(spectrum::StaticStorage::<1024, 64, 64, 256, 4>::new());
         let spectrum = spectrum::Config { window_ns: 300_000_000, hop_ns: 150_000_000, ..Default::default() };
-        let mut analyzer = Analyzer::new(spectrum, group, storage.lend()).unwrap();
+        let mut lines = LineSide::new(config, group, lent).unwrap().with_line_room(&mut room);
+        let mut reports = ReportSide::new(spectrum, group, storage.lend()).unwrap();
         let picture: Vec<u16> = (0..width + 40).map(|_| dice.roll() as u16 >> (16 - config.bits)).collect();
         let most = ((1u32 << config.bits) - 1) as u16;
         let mut pixels = vec![0u16; width];
@@ -157,34 +156,43 @@ proptest! {
                 let ordinary = (n as i64) * 20_000_000 + timing.start_ns(row);
                 let start_ns = if wild { time_of(&mut dice, ordinary) } else { ordinary };
                 let line = Line { frame, row, start_ns, pixels: seen };
-                let Outcome::Measured(d) = tracker.push(&line) else { continue };
-                prop_assert_eq!(d.vertical.is_some(), config.axes == Axes::Xy);
-                let v = d.vertical.unwrap_or_default();
-                // A row whose edges all lie along it tells of y alone.
-                let known = d.information_per_px2 > 0.0
-                    || d.information_per_px2 == 0.0 && v.information_per_px2 > 0.0;
-                prop_assert!(d.shift_px.is_finite() && known, "{d:?}");
-                prop_assert!(v.shift_px.is_finite() && v.coupling.is_finite(), "{d:?}");
-                let Some(sample) = binner.push(d) else { continue };
-                if analyzer.push(sample) && let Some(report) = analyzer.report() {
+                // Row by row in even frames, in one go in odd ones.
+                let reading = if frame % 2 == 0 {
+                    let Outcome::Measured(d) = lines.push_row(&line) else { continue };
+                    prop_assert_eq!(d.vertical.is_some(), config.axes == Axes::Xy);
+                    let v = d.vertical.unwrap_or_default();
+                    // A row whose edges all lie along it tells of y alone.
+                    let known = d.information_per_px2 > 0.0
+                        || d.information_per_px2 == 0.0 && v.information_per_px2 > 0.0;
+                    prop_assert!(d.shift_px.is_finite() && known, "{d:?}");
+                    prop_assert!(v.shift_px.is_finite() && v.coupling.is_finite(), "{d:?}");
+                    lines.bin(d)
+                } else {
+                    lines.push(&line)
+                };
+                let Some(reading) = reading else { continue };
+                if dice.below(100) == 0 {
+                    lines.drop_reading(&reading);
+                } else if reports.push(reading) && let Some(report) = reports.report() {
                     say(report);
                 }
             }
             if dice.below(60) == 0 {
-                tracker.relearn();
+                lines.relearn();
             }
             frame = match wild && dice.below(10) == 0 {
                 true => dice.roll() as u32,
                 false => frame.wrapping_add(1),
             };
             if dice.below(15) == 0 {
-                tracker.end_round();
+                lines.end_round();
             }
         }
-        if let Some(sample) = binner.finish() {
-            analyzer.push(sample);
+        if let Some(reading) = lines.finish() {
+            reports.push(reading);
         }
-        if let Some(report) = analyzer.finish() {
+        reports.push(lines.rest());
+        if let Some(report) = reports.finish() {
             say(report);
         }
     }
@@ -201,8 +209,8 @@ proptest! {
         let group = Group::new(timing, rows_per_sample.min(height)).unwrap();
         let mut binner = Binner::new(group);
         let mut storage = Box::new(spectrum::StaticStorage::<1024, 64, 200, 256, 4>::new());
-        let mut analyzer = match Analyzer::new(spectrum::Config::default(), group, storage.lend()) {
-            Ok(analyzer) => analyzer,
+        let mut reports = match ReportSide::new(spectrum::Config::default(), group, storage.lend()) {
+            Ok(reports) => reports,
             Err(_) => return Ok(()),
         };
         for (n, (frame, row, time_ns, shift_px, information_per_px2, tame)) in (0i64..).zip(rows) {
@@ -215,11 +223,11 @@ proptest! {
                 vertical: None,
             };
             let Some(sample) = binner.push(d) else { continue };
-            if analyzer.push(sample) && let Some(report) = analyzer.report() {
+            if reports.push(sample) && let Some(report) = reports.report() {
                 say(report);
             }
         }
-        if let Some(report) = analyzer.finish() {
+        if let Some(report) = reports.finish() {
             say(report);
         }
     }

@@ -1,7 +1,7 @@
 //! No input makes the spectrum panic, and what it then says is finite.
 
 use rowtone::camera::Timing;
-use rowtone::pipeline::Analyzer;
+use rowtone::pipeline::ReportSide;
 use rowtone::report::{PeakShape, Report, ShapeRow};
 use rowtone::spectrum::{Config, StaticStorage};
 use rowtone::timeline::{Curvature, Group, Sample, Spread, Vertical};
@@ -110,7 +110,7 @@ fn nothing_panics_and_all_is_finite() {
         } else {
             memory.lend()
         };
-        let mut analyzer = Analyzer::new(config, group, lent).unwrap();
+        let mut reports = ReportSide::new(config, group, lent).unwrap();
         let (mut frame, mut start_ns) = (draw.next() as u32, draw.of(&[0, -5, i64::MAX / 2]));
         // Half of the seeds are mostly sane, with odd things strewn in.
         let sane = seed % 2 == 0;
@@ -155,16 +155,16 @@ fn nothing_panics_and_all_is_finite() {
                         }
                     }),
                 };
-                if analyzer.push(sample) && !draw.once_in(4) {
-                    let report = analyzer.report().expect("a window was ready");
+                if reports.push(sample) && !draw.once_in(4) {
+                    let report = reports.report().expect("a window was ready");
                     assert!(is_sane(&report), "{report:?}");
-                    assert!(analyzer.shapes().iter().all(is_sane_shape));
+                    assert!(reports.shapes().iter().all(is_sane_shape));
                 }
             }
         }
-        if let Some(report) = analyzer.finish() {
+        if let Some(report) = reports.finish() {
             assert!(is_sane(&report), "{report:?}");
         }
-        assert_eq!(analyzer.finish(), None);
+        assert_eq!(reports.finish(), None);
     }
 }

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use rowtone::camera::Timing;
-use rowtone::pipeline::Analyzer;
+use rowtone::pipeline::ReportSide;
 use rowtone::report::{Peak, PeakShape, Report};
 use rowtone::spectrum::{Config, StaticStorage};
 use rowtone::timeline::{Group, Sample, Vertical, rows_per_sample};
@@ -46,14 +46,14 @@ fn analysis(seed: u64, motion: impl Fn(f64, f64) -> f64) -> (Report, Vec<PeakSha
     }
     let offsets: Vec<f64> = (0..group.slots()).map(|_| 0.1 * noise.draw()).collect();
     let mut memory = Box::new(Memory::new());
-    let mut analyzer = Analyzer::new(Config::default(), group, memory.lend()).unwrap();
+    let mut reports = ReportSide::new(Config::default(), group, memory.lend()).unwrap();
     for frame in 0..60_u32 {
         for slot in 0..group.slots() {
             let first = f64::from(slot) * f64::from(group.rows_per_sample());
             let eta = (first + 0.5 * f64::from(group.rows_of(slot))) / 72.0 - 1.0;
             let time_ns = (f64::from(frame) * 1e9 / FPS) as i64 + group.middle_ns(slot);
             let moved = motion(time_ns as f64 * 1e-9, eta) + offsets[usize::from(slot)];
-            let done = analyzer.push(Sample {
+            let done = reports.push(Sample {
                 frame,
                 slot,
                 curvature: Default::default(),
@@ -66,8 +66,8 @@ fn analysis(seed: u64, motion: impl Fn(f64, f64) -> f64) -> (Report, Vec<PeakSha
             assert!(!done);
         }
     }
-    let report = analyzer.finish().unwrap();
-    (report, analyzer.shapes().to_vec())
+    let report = reports.finish().unwrap();
+    (report, reports.shapes().to_vec())
 }
 
 /// The one peak that is neither doubtful nor below `least_px`.
@@ -155,7 +155,7 @@ fn textured(seed: u64, lean: Option<f64>, motion: impl Fn(f64, f64) -> [f64; 2])
         })
         .collect();
     let mut memory = Box::new(Memory::new());
-    let mut analyzer = Analyzer::new(Config::default(), group, memory.lend_both()).unwrap();
+    let mut analyzer = ReportSide::new(Config::default(), group, memory.lend_both()).unwrap();
     for frame in 0..60_u32 {
         for (number, slot) in slots.iter().enumerate() {
             let number = number as u16;

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use rowtone::camera::Timing;
-use rowtone::pipeline::Analyzer;
+use rowtone::pipeline::ReportSide;
 use rowtone::report::{Report, Warning};
 use rowtone::spectrum::{Config, StaticStorage};
 use rowtone::timeline::{Group, Sample, rows_per_sample};
@@ -63,7 +63,7 @@ fn report(seed: u64, said: Said, motion: impl Fn(f64, f64) -> f64) -> Report {
         window_ns: (1e9 / said.rate) as i64 + 1,
         ..Config::default()
     };
-    let mut analyzer = Analyzer::new(config, group, memory.lend()).unwrap();
+    let mut analyzer = ReportSide::new(config, group, memory.lend()).unwrap();
     for frame in 0..60_u32 {
         for slot in 0..group.slots() {
             let first = f64::from(slot) * f64::from(group.rows_per_sample());

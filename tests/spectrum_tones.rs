@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use rowtone::camera::Timing;
-use rowtone::pipeline::Analyzer;
+use rowtone::pipeline::ReportSide;
 use rowtone::report::{Peak, Report, Warning};
 use rowtone::spectrum::{Config, FrameRatePlan, StaticStorage};
 use rowtone::timeline::{Binner, Displacement, Group, rows_per_sample};
@@ -43,7 +43,7 @@ impl Camera {
         }
         let offsets: Vec<f64> = (0..timing.rows()).map(|_| 0.1 * noise.draw()).collect();
         let mut memory = Box::new(Memory::new());
-        let mut analyzer = Analyzer::new(config, self.group, memory.lend()).unwrap();
+        let mut report_side = ReportSide::new(config, self.group, memory.lend()).unwrap();
         let mut binner = Binner::new(self.group);
         let mut reports = Vec::new();
         for (frame, start_s) in self.starts_s.iter().enumerate() {
@@ -58,17 +58,17 @@ impl Camera {
                     information_per_px2: (1.0 / (self.noise_px * self.noise_px)) as f32,
                     vertical: None,
                 });
-                if sample.is_some_and(|s| analyzer.push(s)) {
-                    reports.extend(analyzer.report());
+                if sample.is_some_and(|s| report_side.push(s)) {
+                    reports.extend(report_side.report());
                 }
             }
         }
         if let Some(sample) = binner.finish()
-            && analyzer.push(sample)
+            && report_side.push(sample)
         {
-            reports.extend(analyzer.report());
+            reports.extend(report_side.report());
         }
-        reports.extend(analyzer.finish());
+        reports.extend(report_side.finish());
         reports
     }
 }
@@ -185,7 +185,7 @@ fn uneven_rows_make_no_ghosts() {
     }
     let information: Vec<f64> = (0..500).map(|_| noise.draw().exp() * 2500.0).collect();
     let mut memory = Box::new(StaticStorage::<8192, 128, 128, 16384, 17>::new());
-    let mut analyzer = Analyzer::new(Config::default(), group, memory.lend()).unwrap();
+    let mut report_side = ReportSide::new(Config::default(), group, memory.lend()).unwrap();
     let mut binner = Binner::new(group);
     for frame in 0..110_u32 {
         for row in 0..500_u16 {
@@ -200,11 +200,11 @@ fn uneven_rows_make_no_ghosts() {
                 information_per_px2: known as f32,
                 vertical: None,
             });
-            assert!(!sample.is_some_and(|s| analyzer.push(s)));
+            assert!(!sample.is_some_and(|s| report_side.push(s)));
         }
     }
-    binner.finish().map(|s| analyzer.push(s));
-    let report = analyzer.finish().unwrap();
+    binner.finish().map(|s| report_side.push(s));
+    let report = report_side.finish().unwrap();
     assert_eq!(report.peaks.len(), 1, "{:?}", report.peaks);
     let peak = report.peaks[0];
     assert!((f64::from(peak.hz) - 1595.1).abs() < 4.0 * f64::from(peak.hz_sd));
@@ -291,7 +291,7 @@ fn ten_days_are_like_the_first_second() {
         window_ns: 1_000_000_000,
         ..Config::default()
     };
-    let mut analyzer = Analyzer::new(config, group, memory.lend()).unwrap();
+    let mut report_side = ReportSide::new(config, group, memory.lend()).unwrap();
     let mut noise = Noise(5);
     let mut reports = Vec::new();
     let first = u32::MAX - 100_000;
@@ -303,7 +303,7 @@ fn ten_days_are_like_the_first_second() {
                 // 437 Hz makes whole turns in a visit's time, so a phase of its own suffices.
                 let t = (n * 10_000_000 + group.middle_ns(slot)) as f64 * 1e-9;
                 let shift = 0.1 * (TAU * 437.0 * t).cos() + 0.004 * noise.draw();
-                let ready = analyzer.push(rowtone::timeline::Sample {
+                let ready = report_side.push(rowtone::timeline::Sample {
                     curvature: Default::default(),
                     frame,
                     slot,
@@ -314,12 +314,12 @@ fn ten_days_are_like_the_first_second() {
                     vertical: None,
                 });
                 if ready {
-                    reports.extend(analyzer.report());
+                    reports.extend(report_side.report());
                 }
             }
         }
     }
-    reports.extend(analyzer.finish());
+    reports.extend(report_side.finish());
     assert_eq!(reports.len(), 960);
     assert_eq!(reports[959].time_ms, 959 * 900_000 + 200);
     let far = |r: &Report| f64::from(r.peaks[0].hz) - 437.0;

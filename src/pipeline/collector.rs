@@ -1,11 +1,13 @@
 //! The line side: a ring of frames, and when a window is complete.
 
-use super::Reporter;
+use super::warn::WindowTally;
+use super::{Reading, Reporter};
 use crate::math::since;
+use crate::report::Warning;
 use crate::spectrum::{
     Config, ConfigError, FrameMark, SampleBuffer, WindowMark, follow_spread, pack_weight, skew_of,
 };
-use crate::timeline::{Curvature, Group, Sample, Spread, Vertical};
+use crate::timeline::{Curvature, Group, Sample, Spread, Tally, Vertical};
 
 /// Collects samples to windows.
 #[derive(Debug)]
@@ -32,6 +34,10 @@ pub struct Collector<'a> {
     seq: u32,
     dropped_samples: u32,
     dropped_windows: u32,
+    /// A window was dropped since the last one was handed over.
+    missed: bool,
+    /// What is told of the frame that is stored next.
+    tally: Tally,
     /// Of the sample stored last.
     curvature: Curvature,
 }
@@ -67,18 +73,28 @@ impl<'a> Collector<'a> {
             seq: 0,
             dropped_samples: 0,
             dropped_windows: 0,
+            missed: false,
+            tally: Tally::NONE,
             curvature: Curvature::default(),
         })
     }
 
-    /// As [`super::Analyzer::push`]; a complete window waits for [`Collector::hand_over`] until the next push.
-    pub fn push(&mut self, sample: Sample) -> bool {
+    /// As [`super::ReportSide::push`]; a complete window waits for [`Collector::hand_over`] until the next push.
+    pub fn push(&mut self, reading: impl Into<Reading>) -> bool {
+        let Reading { sample, tally } = reading.into();
         if self.ready.take().is_some() {
             self.dropped_windows = self.dropped_windows.saturating_add(1);
+            self.missed = true;
         }
         if let Some(pending) = self.pending.take() {
             self.store(pending);
         }
+        self.note(&tally);
+        sample.is_some_and(|sample| self.take(sample, &tally))
+    }
+
+    /// Takes a sample that came with this tally.
+    fn take(&mut self, sample: Sample, tally: &Tally) -> bool {
         let second = self.second(&sample);
         let known = (sample.information_per_px2 > 0.0
             || sample.information_per_px2 == 0.0 && second.is_some())
@@ -102,6 +118,11 @@ impl<'a> Collector<'a> {
             .is_some_and(|f| start_ns < since(f.start_ns, self.window_ns));
         if back || (new_frame && start_ns >= since(self.end_ns, self.slack_ns())) {
             let complete = self.complete(self.end_ns);
+            // Frames without a sample lie between: what became of them is said of both windows.
+            let next = self.newest().map(|f| f.number.wrapping_add(1));
+            if next != Some(sample.frame) {
+                self.tally.add(tally);
+            }
             self.pending = Some(sample);
             self.advance(start_ns, back);
             return complete;
@@ -141,6 +162,7 @@ impl<'a> Collector<'a> {
         let Some(mark) = self.ready.take() else {
             return false;
         };
+        self.missed = false;
         let (capacity, first) = (self.capacity, self.first_of(mark.start_ns));
         let (oldest, ring) = (self.oldest, &self.ring);
         to.load(mark, ring, capacity, |i| (oldest + first + i) % capacity);
@@ -160,6 +182,27 @@ impl<'a> Collector<'a> {
     /// Windows complete but never handed over.
     pub const fn dropped_windows(&self) -> u32 {
         self.dropped_windows
+    }
+
+    /// A sample came too late for its frame.
+    fn drop_sample(&mut self) {
+        self.dropped_samples = self.dropped_samples.saturating_add(1);
+        self.note(&Tally {
+            dropped_samples: 1,
+            ..Tally::NONE
+        });
+    }
+
+    /// Adds what became of rows to the newest frame; where there is none, to the one that comes.
+    fn note(&mut self, tally: &Tally) {
+        let newest = match self.held.checked_sub(1) {
+            Some(i) if !self.restart => self.ring.frames.get_mut((self.oldest + i) % self.capacity),
+            _ => None,
+        };
+        match newest {
+            Some(frame) => frame.tally.add(tally),
+            None => self.tally.add(tally),
+        }
     }
 
     pub(super) fn column(&self, i: usize) -> usize {
@@ -217,7 +260,7 @@ impl<'a> Collector<'a> {
             && newest.number != sample.frame
             && start_ns <= newest.start_ns
         {
-            self.dropped_samples = self.dropped_samples.saturating_add(1);
+            self.drop_sample();
             return;
         }
         let slots = usize::from(self.group.slots());
@@ -228,10 +271,16 @@ impl<'a> Collector<'a> {
             }
             let column = self.column(self.held);
             self.held += 1;
+            let mut tally = core::mem::take(&mut self.tally);
+            if self.held == 1 {
+                // What came before the first frame is no loss between frames.
+                (tally.frames, tally.bad_light) = (0, 0);
+            }
             if let Some(frame) = self.ring.frames.get_mut(column) {
                 *frame = FrameMark {
                     number: sample.frame,
                     start_ns,
+                    tally,
                 };
             }
             for series in 0..self.ring.channels(slots) * slots {
@@ -250,6 +299,10 @@ impl<'a> Collector<'a> {
             let first = self.held == 1 || *spread == Spread::default();
             if !follow_spread(spread, sample.spread, first, &self.group.even_spread()) {
                 self.dropped_samples = self.dropped_samples.saturating_add(1);
+                self.note(&Tally {
+                    thin_groups: 1,
+                    ..Tally::NONE
+                });
                 return;
             }
         }
@@ -288,7 +341,17 @@ impl<'a> Collector<'a> {
         }
         self.leave_out_elsewhere(first);
         let numbers = b.number.wrapping_sub(a.number);
-        let lost = (numbers as usize).saturating_add(1).saturating_sub(frames);
+        let mut sum = WindowTally::default();
+        for i in first..self.held {
+            if let Some(frame) = self.frame(i) {
+                sum.add(&frame.tally);
+            }
+        }
+        // Frames of which no row could be measured came all the same.
+        let came = frames.max(sum.frames() as usize);
+        let lost = (numbers as usize).saturating_add(1).saturating_sub(came);
+        let mut warnings = sum.warnings(self.group.slots());
+        warnings.insert_if(self.missed, Warning::DroppedWindows);
         let mut lines = 0_u32;
         for slot in 0..self.group.slots() {
             for i in first..self.held {
@@ -315,6 +378,7 @@ impl<'a> Collector<'a> {
             lines,
             curvature: self.curvature,
             short,
+            warnings,
         });
         self.seq = self.seq.wrapping_add(1);
         self.done_ns = Some(end_ns);
@@ -338,7 +402,7 @@ impl<'a> Collector<'a> {
 #[cfg(test)]
 mod tests {
     extern crate std;
-    use super::super::Analyzer;
+    use super::super::ReportSide;
     use super::*;
     use crate::camera::Timing;
     use crate::report::Report;
@@ -351,12 +415,12 @@ mod tests {
         let group = Group::new(Timing::new(1_000_000_000, 0, 8).unwrap(), 2).unwrap();
         let mut storage = Box::new(StaticStorage::<1024, 128, 8, 2048, 4>::new());
         let config = Config::default();
-        let mut analyzer = Analyzer::new(config, group, storage.lend()).unwrap();
+        let mut report_side = ReportSide::new(config, group, storage.lend()).unwrap();
         let mut reports = Vec::new();
         for frame in 0..frames {
             let start_ns = i64::from(frame) * 1_000_000_000 / 60 - early_ns(frame);
             for slot in 0..group.slots() {
-                let complete = analyzer.push(Sample {
+                let complete = report_side.push(Sample {
                     frame,
                     slot,
                     curvature: Curvature::default(),
@@ -367,11 +431,11 @@ mod tests {
                     vertical: None,
                 });
                 if complete {
-                    reports.extend(analyzer.report());
+                    reports.extend(report_side.report());
                 }
             }
         }
-        reports.extend(analyzer.finish());
+        reports.extend(report_side.finish());
         reports
     }
 

@@ -74,7 +74,7 @@ impl Collector<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::Analyzer;
+    use super::super::ReportSide;
     use crate::camera::Timing;
     use crate::report::Report;
     use crate::spectrum::{Config, StaticStorage};
@@ -86,7 +86,7 @@ mod tests {
     fn report(amplitude_px: f32, odd: u32, away_px: f32) -> Report {
         let group = Group::new(Timing::new(50_000_000, 0, 300).unwrap(), 10).unwrap();
         let mut memory = Box::new(StaticStorage::<2048, 64, 32, 4096, 9>::new());
-        let mut analyzer = Analyzer::new(Config::default(), group, memory.lend()).unwrap();
+        let mut analyzer = ReportSide::new(Config::default(), group, memory.lend()).unwrap();
         let mut dice = 1_u32;
         for frame in 0..60 {
             for slot in 0..group.slots() {

@@ -1,7 +1,7 @@
 //! The computing side: a window handed over becomes a report.
 
 use crate::math::since;
-use crate::report::{PeakShape, Report, Warning, Warnings};
+use crate::report::{PeakShape, Report};
 use crate::spectrum::{
     Config, ConfigError, Estimator, EstimatorStorage, Follower, SampleBuffer, Tones, WindowMark,
     name_harmonics,
@@ -86,22 +86,12 @@ impl<'a> Reporter<'a> {
             lost_frames: mark.lost_frames,
             noise_px: tones.row_noise_px,
             velocity_mm_s_rms: um_per_px.map(|scale| band_velocity(&tones, scale)),
-            warnings: warnings(&mark, &tones),
+            warnings: super::warn::of_window(&mark, &tones, window_s),
             peaks: tones.peaks,
             um_per_px,
             line_time_us_fit: tones.line_time_us_fit,
         }
     }
-}
-
-fn warnings(mark: &WindowMark, tones: &Tones) -> Warnings {
-    let mut warnings = Warnings::NONE;
-    warnings.insert_if(tones.hidden, Warning::HiddenNearFrameRate);
-    warnings.insert_if(mark.lost_frames > 0, Warning::LostFrames);
-    warnings.insert_if(mark.short, Warning::ShortWindow);
-    warnings.insert_if(tones.more, Warning::MoreTones);
-    warnings.insert_if(tones.timing_contradiction, Warning::TimingContradiction);
-    warnings
 }
 
 /// Velocity of the peaks within 10–1000 Hz, mm/s RMS: √Σ(2πfA)²/2 (ISO 20816-1).

@@ -1,7 +1,7 @@
 //! The memory that the collecting and the computing side work in, lent by the caller.
 
 use super::window::{FrameMark, SampleBuffer, SlotCoupling};
-use crate::timeline::Spread;
+use crate::timeline::{Spread, Tally};
 
 /// Rows of [`EstimatorStorage::frame_rows`]: time, weight and four of scratch.
 pub(crate) const FRAME_ROWS: usize = 6;
@@ -38,7 +38,7 @@ pub struct EstimatorStorage<'a> {
     pub grid: &'a mut [f32],
 }
 
-/// All that an [`crate::pipeline::Analyzer`] works in.
+/// All that an [`crate::pipeline::ReportSide`] works in.
 #[derive(Debug)]
 pub struct Storage<'a> {
     /// Samples as they come.
@@ -49,13 +49,13 @@ pub struct Storage<'a> {
 
 /// Arrays of fixed size for [`Storage`]: a `static` on a microcontroller, a local in a test.
 ///
-/// `ROWS` is the most tones fitted at once, and one. `StaticStorage<4096, 96, 96, 8192, 13>` takes about 125 KiB: twice
+/// `ROWS` is the most tones fitted at once, and one. `StaticStorage<4096, 96, 96, 8192, 13>` takes about 130 KiB: twice
 /// 32 KiB of samples, 32 KiB of grid, the rest tables.
 ///
 /// ```
 /// use rowtone::spectrum::StaticStorage;
 /// let mut storage = Box::new(StaticStorage::<4096, 96, 96, 8192, 9>::new());
-/// assert!(core::mem::size_of_val(&*storage) < 120 * 1024);
+/// assert!(core::mem::size_of_val(&*storage) < 125 * 1024);
 /// let storage = storage.lend();
 /// assert_eq!(storage.estimator.grid.len(), 8192);
 /// ```
@@ -108,6 +108,7 @@ impl<
             frames: [[FrameMark {
                 number: 0,
                 start_ns: 0,
+                tally: Tally::NONE,
             }; FRAMES]; 2],
             frame_ns: [0; FRAMES],
             slot_ns: [0; SLOTS],

@@ -6,7 +6,8 @@
 //! differently from frame to frame) is its skew, kept in small steps and applied to first order.
 
 use crate::math::since;
-use crate::timeline::{Curvature, Group, Sample, Spread, Vertical};
+use crate::report::Warnings;
+use crate::timeline::{Curvature, Group, Sample, Spread, Tally, Vertical};
 
 /// Samples as they are collected: shift, weight and skew, 8 bytes a sample, and 6 more where they know both axes.
 #[derive(Debug)]
@@ -68,6 +69,8 @@ pub struct FrameMark {
     pub number: u32,
     /// Start of exposure of its first row, ns on the camera's clock.
     pub start_ns: i64,
+    /// What became of its rows.
+    pub tally: Tally,
 }
 
 impl SampleBuffer<'_> {
@@ -167,4 +170,6 @@ pub struct WindowMark {
     pub curvature: Curvature,
     /// Shorter than asked for.
     pub short: bool,
+    /// What its rows warn of.
+    pub warnings: Warnings,
 }

@@ -4,11 +4,11 @@ use crate::lines::{ClipError, Lines, MAX_WIDTH, Pixels8};
 use core::fmt::{self, Write};
 use cortex_m_rt::entry;
 use rowtone::camera::{Timing, TimingError};
-use rowtone::pipeline::Analyzer;
+use rowtone::pipeline::{LineSide, Reading, ReportSide};
 use rowtone::report::Report;
 use rowtone::spectrum;
-use rowtone::timeline::{Binner, BinnerError, Group, Sample};
-use rowtone::tracker::{self, StaticStorage, Tracker};
+use rowtone::timeline::{BinnerError, Group};
+use rowtone::tracker::{self, StaticStorage};
 use rowtone::wire::{Message, text};
 use rowtone_mps2_an505::args::Args;
 use rowtone_mps2_an505::board::{
@@ -25,7 +25,7 @@ use static_cell::{ConstStaticCell, StaticCell};
 static LINES: ConstStaticCell<StaticStorage<{ 320 * 240 }, 480, MAX_WIDTH>> =
     ConstStaticCell::new(StaticStorage::new());
 static SPECTRUM: ConstStaticCell<SpectrumMemory> = ConstStaticCell::new(SpectrumMemory::new());
-static ANALYZER: StaticCell<Analyzer<'static>> = StaticCell::new();
+static REPORTS: StaticCell<ReportSide<'static>> = StaticCell::new();
 
 /// Frames that are learned from, at the clip's start; as `rowtone analyze` does it.
 const LEARN_FRAMES: u32 = 30;
@@ -66,9 +66,8 @@ fn run(args: &Args, uart: &mut Uart) -> Result<(), Failure> {
         uart,
         counter,
         lines,
-        tracker: Tracker::new(tracking, LINES.take().lend())?,
-        binner: Binner::new(group),
-        analyzer: analyzer(config, group)?,
+        side: LineSide::new(tracking, group, LINES.take().lend())?,
+        reports: reports(config, group)?,
         timing,
         per_line: Count::default(),
         per_nothing: Count::default(),
@@ -87,22 +86,21 @@ fn run(args: &Args, uart: &mut Uart) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Not inlined: the analyzer takes 8 KiB, which shall be on the stack only while it is made.
+/// Not inlined: the reports takes 8 KiB, which shall be on the stack only while it is made.
 #[inline(never)]
-fn analyzer(
+fn reports(
     config: spectrum::Config,
     group: Group,
-) -> Result<&'static mut Analyzer<'static>, spectrum::ConfigError> {
-    Ok(ANALYZER.init(Analyzer::new(config, group, SPECTRUM.take().lend())?))
+) -> Result<&'static mut ReportSide<'static>, spectrum::ConfigError> {
+    Ok(REPORTS.init(ReportSide::new(config, group, SPECTRUM.take().lend())?))
 }
 
 struct Board<'a> {
     uart: &'a mut Uart,
     counter: Option<Counter>,
     lines: Lines,
-    tracker: Tracker<'static>,
-    binner: Binner,
-    analyzer: &'static mut Analyzer<'static>,
+    side: LineSide<'static>,
+    reports: &'static mut ReportSide<'static>,
     timing: Timing,
     per_line: Count,
     /// Nothing at all: what counting a line takes itself. It is taken off.
@@ -130,13 +128,13 @@ impl Board<'_> {
                 }
                 let start = self.counter.as_ref().map(Counter::start);
                 // It gives nothing yet.
-                self.tracker.push_into(&line, &mut self.binner);
+                self.side.push(&line);
                 if let (Some(counter), Some(start)) = (&self.counter, start) {
                     self.per_learning_line.add(counter.instructions(start));
                 }
             }
             let start = self.counter.as_ref().map(Counter::start);
-            self.tracker.end_round();
+            self.side.end_round();
             if let (Some(counter), Some(start)) = (&self.counter, start) {
                 self.per_round.add(counter.instructions(start));
             }
@@ -155,26 +153,28 @@ impl Board<'_> {
                 self.per_nothing.add(counter.instructions(start));
             }
             let start = self.counter.as_ref().map(Counter::start);
-            let sample = self.tracker.push_into(&line, &mut self.binner);
+            let reading = self.side.push(&line);
             if let (Some(counter), Some(start)) = (&self.counter, start) {
                 self.per_line.add(counter.instructions(start));
             }
-            self.collect(sample);
+            self.collect(reading);
         }
-        let last = self.binner.finish();
+        let last = self.side.finish();
         self.collect(last);
+        let rest = self.side.rest();
+        self.collect(Some(rest));
         let mark = self.mark();
         let start = self.counter.as_ref().map(Counter::start);
-        let report = self.analyzer.finish();
+        let report = self.reports.finish();
         self.count_and_say(mark, start, report);
         Ok(())
     }
 
-    fn collect(&mut self, sample: Option<Sample>) {
-        if sample.is_some_and(|sample| self.analyzer.push(sample)) {
+    fn collect(&mut self, reading: Option<Reading>) {
+        if reading.is_some_and(|reading| self.reports.push(reading)) {
             let mark = self.mark();
             let start = self.counter.as_ref().map(Counter::start);
-            let report = self.analyzer.report();
+            let report = self.reports.report();
             self.count_and_say(mark, start, report);
         }
     }

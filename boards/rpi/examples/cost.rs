@@ -13,9 +13,7 @@ use std::time::Duration;
 
 use rowtone::camera::RawFormat;
 use rowtone::camera::{Line, Pixels};
-use rowtone::pipeline::Collector;
-use rowtone::timeline::Binner;
-use rowtone::tracker::Tracker;
+use rowtone::pipeline::{Collector, LineSide};
 use rowtone_rpi::capture::simulated::{Scene, Simulated};
 use rowtone_rpi::capture::{Frame, Shape, Source};
 use rowtone_rpi::clock::FrameClock;
@@ -173,8 +171,8 @@ fn core_alone(setup: &Setup, frames: &[(i64, Vec<u8>)], rounds: usize) -> Best {
     let rows = usize::from(setup.part.height);
     let mut tracker_memory = TrackerMemory::new(setup.part.width, setup.part.height);
     let mut spectrum_memory = SpectrumMemory::new(setup.group, setup.window_frames);
-    let mut tracker = Tracker::new(setup.tracker, tracker_memory.lend().0).expect("good");
-    let mut binner = Binner::new(setup.group);
+    let (picture, _) = tracker_memory.lend();
+    let mut lines = LineSide::new(setup.tracker, setup.group, picture).expect("good");
     let collected = spectrum_memory.lend().collected;
     let mut collector = Collector::new(&setup.spectrum, setup.group, collected).expect("good");
     let timing = setup.group.timing();
@@ -196,8 +194,8 @@ fn core_alone(setup: &Setup, frames: &[(i64, Vec<u8>)], rounds: usize) -> Best {
                     start_ns: start_ns + timing.start_ns(row),
                     pixels,
                 };
-                if let Some(sample) = tracker.push_into(&line, &mut binner) {
-                    collector.push(sample);
+                if let Some(reading) = lines.push(&line) {
+                    collector.push(reading);
                 }
             }
             number += 1;
@@ -221,7 +219,7 @@ fn whole_path(setup: &Setup, frames: &[(i64, Vec<u8>)], rounds: usize) -> Best {
                 bytes,
                 intact: true,
             };
-            lines.frame(&frame, &mut |_, _| {});
+            lines.frame(&frame, &mut |_| {});
             sequence += 1;
         }
     })

@@ -85,7 +85,7 @@ fn noise_px(frames: &[Vec<u8>], facts: &Facts, full_depth: bool) -> f32 {
             bytes,
             intact: true,
         };
-        lines.frame(&frame, &mut |collector, _| {
+        lines.frame(&frame, &mut |collector| {
             collector.hand_over(&mut reporter);
             noise = reporter.report().noise_px;
         });

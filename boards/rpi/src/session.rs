@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 
 use rowtone::link::settings::Settings;
 use rowtone::pipeline::{Collector, Reporter};
-use rowtone::report::{Report, Warnings};
+use rowtone::report::Report;
 use rowtone::spectrum::FrameRatePlan;
 
 use crate::alive::{Alive, Pulses};
@@ -93,7 +93,6 @@ pub enum Ended {
 
 /// A window handed over.
 struct Ready {
-    warnings: Warnings,
     /// Time of the program at which the session began, ms.
     offset_ms: u64,
 }
@@ -149,7 +148,7 @@ pub fn run(
         );
         // The last window is worth waiting for.
         handover.last = true;
-        lines.finish(&mut |collector, warnings| handover.give(collector, warnings));
+        lines.finish(&mut |collector| handover.give(collector));
         ended
     });
     Ok((ended, lines.clock().counts()))
@@ -180,9 +179,7 @@ fn lines_until_end(
         let mut start_ns = None;
         let outcome = source.next(patience, &mut |frame| {
             start_ns = frame.start_ns;
-            lines.frame(&frame, &mut |collector, warnings| {
-                handover.give(collector, warnings);
-            });
+            lines.frame(&frame, &mut |collector| handover.give(collector));
         });
         match outcome {
             Ok(()) => {
@@ -254,7 +251,7 @@ struct Handover<'s, 'm> {
 }
 
 impl Handover<'_, '_> {
-    fn give(&mut self, collector: &mut Collector<'_>, warnings: Warnings) {
+    fn give(&mut self, collector: &mut Collector<'_>) {
         let reporter = if self.last {
             self.reporter.lock().ok()
         } else {
@@ -271,10 +268,7 @@ impl Handover<'_, '_> {
         if collector.hand_over(&mut reporter) {
             drop(reporter);
             self.shared.pulses.spectrum.expect(self.shared.started);
-            let ready = Ready {
-                warnings,
-                offset_ms,
-            };
+            let ready = Ready { offset_ms };
             let sent = if self.last {
                 self.ready.send(ready).is_ok()
             } else {
@@ -302,7 +296,6 @@ fn compute(
             Err(_) => break,
         };
         shared.pulses.spectrum.rest();
-        report.warnings = report.warnings.union(ready.warnings);
         // The core counts from the session's first frame, a board from its own start.
         let first = *first_ms.get_or_insert(report.time_ms);
         report.time_ms = ready.offset_ms + report.time_ms.saturating_sub(first);

@@ -332,7 +332,7 @@ fn the_line_path_allocates_nothing_once_it_runs() {
     let mut right = 0;
     for _ in 0..300 {
         let frame = source.next(Duration::ZERO, &mut |frame| {
-            lines.frame(&frame, &mut |collector, _| {
+            lines.frame(&frame, &mut |collector| {
                 collector.hand_over(&mut reporter);
                 right += u32::from(is_right(&reporter.report()));
             });

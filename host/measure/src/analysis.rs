@@ -1,20 +1,17 @@
-//! From samples to reports: the core's analyzer, fed frame by frame.
+//! From samples to reports: the core's report side, fed frame by frame.
 //!
 //! A [`Plan`] decides how many rows make a sample and how much memory a window takes; [`Analysis::run`]
 //! then hands every sample and every report to whoever wants them, as they come.
 
-use std::collections::VecDeque;
-
 use rowtone::camera::Timing;
-use rowtone::pipeline::Analyzer;
+use rowtone::pipeline::{Reading, ReportSide, Silence};
 use rowtone::report::{PeakShape, Report, Warning};
 use rowtone::spectrum::Config;
-use rowtone::timeline::{Group, Sample, rows_per_sample};
+use rowtone::timeline::{Group, Sample, Tally, rows_per_sample};
 use rowtone::tracker::Axes;
 
 use crate::memory::SpectrumMemory;
-use crate::silence::Silence;
-use crate::tracking::{FrameShifts, Shifts, Unmeasured};
+use crate::tracking::{FrameShifts, Shifts};
 use rowtone_clip::Camera;
 use rowtone_failure::Failure;
 
@@ -28,8 +25,6 @@ const DENSER: f64 = 2.0;
 const JUST_ABOVE: f64 = 1.05;
 /// Most samples of a window.
 const MOST_SAMPLES: usize = 1 << 20;
-/// Rows flagged in a window, as a share, before it counts as disturbed.
-const DISTURBED_SHARE: f64 = 0.01;
 
 /// What to look for.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -151,10 +146,7 @@ pub enum Event<'a> {
 #[derive(Debug)]
 pub struct Analysis<'a> {
     shifts: Shifts,
-    analyzer: Analyzer<'a>,
-    window_ns: i64,
-    /// When the frames of the window started, ns, and the rows of each that were not measured.
-    unmeasured: VecDeque<(i64, Unmeasured)>,
+    reports: ReportSide<'a>,
     /// Frames without samples.
     silence: Silence,
 }
@@ -169,13 +161,11 @@ impl<'a> Analysis<'a> {
         plan: &Plan,
         memory: &'a mut SpectrumMemory,
     ) -> Result<Self, Failure> {
-        let analyzer = Analyzer::new(plan.config, plan.group, memory.lend())
+        let reports = ReportSide::new(plan.config, plan.group, memory.lend())
             .map_err(|error| Failure::usage(error.to_string()))?;
         Ok(Self {
             shifts,
-            analyzer,
-            window_ns: plan.config.window_ns,
-            unmeasured: VecDeque::new(),
+            reports,
             silence: Silence::new(plan.config.window_ns, plan.config.hop_ns),
         })
     }
@@ -199,7 +189,7 @@ impl<'a> Analysis<'a> {
                 Err(failure) => break Err(failure),
             }
         };
-        if let Some(report) = self.analyzer.finish() {
+        if let Some(report) = self.reports.finish() {
             self.hand_on(report, &mut on)?;
         }
         outcome
@@ -216,53 +206,37 @@ impl<'a> Analysis<'a> {
         on: &mut impl FnMut(Event<'_>) -> Result<(), Failure>,
     ) -> Result<(), Failure> {
         on(Event::Frame(frame.start_ns))?;
-        let past = frame.start_ns.saturating_sub(self.window_ns);
-        while self.unmeasured.front().is_some_and(|(t, _)| *t < past) {
-            self.unmeasured.pop_front();
+        let mut tally = Tally::NONE;
+        let mut silent = true;
+        for reading in &frame.readings {
+            tally.add(&reading.tally);
+            silent &= reading.sample.is_none();
         }
-        self.unmeasured
-            .push_back((frame.start_ns, frame.unmeasured));
-        let silent = frame.samples.is_empty();
-        if let Some(report) =
-            self.silence
-                .note_frame(frame.start_ns, silent, self.shifts.camera.fps)
-            && !self.lacks_texture()
+        let fps = self.shifts.camera.fps as f32;
+        if let Some(report) = self.silence.note_frame(frame.start_ns, silent, fps, &tally)
+            // Nothing could ever be measured, which is no report but a refusal.
+            && !report.warnings.contains(Warning::LittleTexture)
         {
             self.hand_on(report, on)?;
         }
-        frame
-            .samples
-            .iter()
-            .try_for_each(|sample| self.push(sample, on))
+        let mut readings = frame.readings.iter();
+        readings.try_for_each(|reading| self.push(reading, on))
     }
 
     fn push(
         &mut self,
-        sample: &Sample,
+        reading: &Reading,
         on: &mut impl FnMut(Event<'_>) -> Result<(), Failure>,
     ) -> Result<(), Failure> {
-        on(Event::Sample(sample))?;
-        if self.analyzer.push(*sample)
-            && let Some(report) = self.analyzer.report()
+        if let Some(sample) = &reading.sample {
+            on(Event::Sample(sample))?;
+        }
+        if self.reports.push(*reading)
+            && let Some(report) = self.reports.report()
         {
             self.hand_on(report, on)?;
         }
         Ok(())
-    }
-
-    /// Rows of the window that were not measured.
-    fn unmeasured(&self) -> Unmeasured {
-        let mut unmeasured = Unmeasured::default();
-        for (_, of_frame) in &self.unmeasured {
-            unmeasured += *of_frame;
-        }
-        unmeasured
-    }
-
-    /// Nothing could ever be measured, which is no report but a refusal.
-    fn lacks_texture(&self) -> bool {
-        let rows = self.unmeasured.len() * self.shifts.part.height;
-        2 * self.unmeasured().no_texture as usize > rows
     }
 
     fn hand_on(
@@ -270,25 +244,10 @@ impl<'a> Analysis<'a> {
         mut report: Report,
         on: &mut impl FnMut(Event<'_>) -> Result<(), Failure>,
     ) -> Result<(), Failure> {
-        // What only the tracker knows.
-        let unmeasured = self.unmeasured();
         self.silence.number(&mut report);
-        let rows = (self.unmeasured.len() * self.shifts.part.height).max(1);
-        let share = |unmeasured: u32| f64::from(unmeasured) / rows as f64;
-        let warnings = &mut report.warnings;
-        *warnings = warnings.union(self.shifts.camera.warnings);
-        let occluded = share(unmeasured.disturbed) > DISTURBED_SHARE;
-        warnings.insert_if(occluded, Warning::Occluded);
-        warnings.insert_if(unmeasured.learning > 0, Warning::Relearned);
-        let bad_light = share(unmeasured.unlit) > 0.5;
-        warnings.insert_if(bad_light, Warning::BadLight);
-        let rows_of_frame = self.shifts.part.height as u32;
-        let copies = self.unmeasured.iter();
-        let copies = copies.filter(|(_, f)| 2 * f.repeated > rows_of_frame);
-        warnings.insert_if(copies.count() > 0, Warning::RepeatedFrames);
-        let little_texture = share(unmeasured.no_texture) > 0.5;
-        warnings.insert_if(little_texture, Warning::LittleTexture);
-        let mut shapes = self.analyzer.shapes().to_vec();
+        // What the recording as a whole warns of.
+        report.warnings = report.warnings.union(self.shifts.camera.warnings);
+        let mut shapes = self.reports.shapes().to_vec();
         for row in shapes.iter_mut().flat_map(|s| &mut s.rows) {
             row.row = row.row.saturating_add(self.shifts.part.y as u16);
         }

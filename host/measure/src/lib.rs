@@ -7,5 +7,4 @@
 pub mod analysis;
 pub mod memory;
 pub mod restore;
-mod silence;
 pub mod tracking;

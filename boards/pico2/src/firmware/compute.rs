@@ -1,4 +1,4 @@
-//! Samples to windows, windows to reports, on core 1.
+//! Readings to windows, windows to reports, on core 1.
 
 use super::shared::{DROPPED_WINDOWS, M, PLAN};
 use core::cell::RefCell;
@@ -8,25 +8,25 @@ use embassy_sync::channel::Channel;
 use embassy_sync::signal::Signal;
 use heapless::spsc::{Consumer, Producer, Queue};
 use rowtone::camera::Timing;
-use rowtone::pipeline::{Collector, Reporter};
+use rowtone::pipeline::{Collector, Reading, Reporter};
 use rowtone::report::Report;
-use rowtone::timeline::{Group, Sample};
+use rowtone::timeline::Group;
 use rowtone_pico2::handover::count;
 use rowtone_pico2::memory::SpectrumMemory;
 use rowtone_pico2::plan::{DEFAULTS, ROWS, spectrum_config};
 use static_cell::StaticCell;
 
-/// Samples on their way: core 1's interrupt takes them at once, unless it is sending or copying a window.
+/// Readings on their way: core 1's interrupt takes them at once, unless it is sending or copying a window.
 const WAITING: usize = 128;
 
-static QUEUE: StaticCell<Queue<Sample, WAITING>> = StaticCell::new();
-static PRODUCER: Mutex<M, RefCell<Option<Producer<'static, Sample>>>> =
+static QUEUE: StaticCell<Queue<Reading, WAITING>> = StaticCell::new();
+static PRODUCER: Mutex<M, RefCell<Option<Producer<'static, Reading>>>> =
     Mutex::new(RefCell::new(None));
-static CONSUMER: Mutex<M, RefCell<Option<Consumer<'static, Sample>>>> =
+static CONSUMER: Mutex<M, RefCell<Option<Consumer<'static, Reading>>>> =
     Mutex::new(RefCell::new(None));
 static REPORTER: StaticCell<Reporter<'static>> = StaticCell::new();
 
-/// There are samples in the queue.
+/// There are readings in the queue.
 pub(crate) static COME: Signal<M, ()> = Signal::new();
 /// A computer that has nothing to do.
 static IDLE: Channel<M, &'static mut Reporter<'static>, 1> = Channel::new();
@@ -63,21 +63,21 @@ pub(crate) fn set_up(
 }
 
 /// The queue's end on core 0; once.
-pub(crate) fn samples() -> Option<Producer<'static, Sample>> {
+pub(crate) fn readings() -> Option<Producer<'static, Reading>> {
     PRODUCER.lock(|p| p.take())
 }
 
-/// Collects samples, and hands complete windows over.
+/// Collects readings, and hands complete windows over.
 #[embassy_executor::task]
 pub(crate) async fn collect(mut collector: Collector<'static>) {
-    let Some(mut samples) = CONSUMER.lock(|c| c.take()) else {
+    let Some(mut readings) = CONSUMER.lock(|c| c.take()) else {
         return;
     };
     let mut due = None;
     loop {
         match select(PLAN.wait(), COME.wait()).await {
             Either::First(plan) => {
-                while samples.dequeue().is_some() {} // of the plan before
+                while readings.dequeue().is_some() {} // of the plan before
                 match Collector::new(&plan.spectrum, plan.group, collector.into_storage()) {
                     Ok(anew) => collector = anew,
                     // The plan was checked against this memory.
@@ -86,8 +86,8 @@ pub(crate) async fn collect(mut collector: Collector<'static>) {
                 due = Some(plan);
             }
             Either::Second(()) => {
-                while let Some(sample) = samples.dequeue() {
-                    if !collector.push(sample) {
+                while let Some(reading) = readings.dequeue() {
+                    if !collector.push(reading) {
                         continue;
                     }
                     let Ok(reporter) = IDLE.try_receive() else {

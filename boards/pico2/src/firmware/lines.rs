@@ -7,39 +7,39 @@ use super::{Picture, compute};
 use core::sync::atomic::Ordering;
 use rowtone::camera::{Line, Pixels};
 use rowtone::link::settings::Region;
-use rowtone::timeline::{Binner, Sample};
-use rowtone::tracker::{Stage, Tracker};
+use rowtone::pipeline::{LineSide, Reading};
+use rowtone::tracker::Stage;
 use rowtone_pico2::handover::{LineBuffer, Taker, count};
 use rowtone_pico2::plan::Plan;
 
 /// Plans, learns and measures, until a new plan is due; for ever.
 #[embassy_executor::task]
 pub(crate) async fn work(mut taker: Taker<'static, M>, picture: &'static mut Picture) {
-    let Some(mut samples) = compute::samples() else {
+    let Some(mut readings) = compute::readings() else {
         return;
     };
     loop {
         MEASURING.store(false, Ordering::Relaxed);
         PLAN_ANEW.store(false, Ordering::Relaxed);
         let plan = plan(&mut taker).await;
-        let Ok(mut tracker) = Tracker::new(plan.tracker(), picture.lend()) else {
+        let Ok(mut lines) = LineSide::new(plan.tracker(), plan.group, picture.lend()) else {
             defmt::error!("the tracker refuses the plan");
             continue;
         };
         defmt::info!("measuring lines of {} ps", plan.timing.line_time_ps());
-        let mut binner = Binner::new(plan.group);
         PLAN.signal(plan);
         while !PLAN_ANEW.load(Ordering::Relaxed) {
-            if let Some(sample) = taker
-                .work(|line| measure(line, &plan, &mut tracker, &mut binner))
-                .await
-            {
-                match samples.enqueue(sample) {
+            if let Some(reading) = taker.work(|line| measure(line, &plan, &mut lines)).await {
+                match readings.enqueue(reading) {
                     Ok(()) => compute::COME.signal(()),
-                    Err(_) => count(&DROPPED_SAMPLES),
+                    Err(reading) => {
+                        lines.drop_reading(&reading);
+                        count(&DROPPED_SAMPLES);
+                    }
                 }
             }
-            MEASURING.store(tracker.stage() == Stage::Tracking, Ordering::Relaxed);
+            let measuring = lines.tracker().stage() == Stage::Tracking;
+            MEASURING.store(measuring, Ordering::Relaxed);
         }
     }
 }
@@ -65,12 +65,7 @@ async fn plan(taker: &mut Taker<'static, M>) -> Plan {
     }
 }
 
-fn measure(
-    buffer: &LineBuffer,
-    plan: &Plan,
-    tracker: &mut Tracker<'_>,
-    binner: &mut Binner,
-) -> Option<Sample> {
+fn measure(buffer: &LineBuffer, plan: &Plan, lines: &mut LineSide<'_>) -> Option<Reading> {
     let Region {
         x,
         y,
@@ -97,5 +92,5 @@ fn measure(
         start_ns,
         pixels: Pixels::U8(pixels),
     };
-    tracker.push_into(&line, binner)
+    lines.push(&line)
 }

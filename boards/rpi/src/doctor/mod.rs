@@ -105,7 +105,7 @@ fn watch(source: &mut dyn Source, config: &Config, findings: &mut Findings) {
     let enough = 2 * u64::from(config.camera.learn_frames) + 30;
     while lines.clock().counts().good < enough && began.elapsed() < WATCH {
         let patience = Duration::from_secs_f64(config.service.silence_s);
-        if let Err(e) = source.next(patience, &mut |frame| lines.frame(&frame, &mut |_, _| {})) {
+        if let Err(e) = source.next(patience, &mut |frame| lines.frame(&frame, &mut |_| {})) {
             findings.bad(&format!("frames: {e}"));
             break;
         }

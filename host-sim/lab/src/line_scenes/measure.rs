@@ -1,7 +1,7 @@
 //! A recording through the real tracker, and its figures.
 
 use rowtone::camera::Line;
-use rowtone::pipeline::Analyzer;
+use rowtone::pipeline::ReportSide;
 use rowtone::spectrum;
 use rowtone::timeline::{Binner, Displacement, Group, rows_per_sample};
 use rowtone::tracker::{Config, ConfigError, Outcome, Tracker};
@@ -248,19 +248,19 @@ fn look_for_peaks(
         max_peaks: 16,
         ..spectrum::Config::default()
     };
-    let mut analyzer =
-        Analyzer::new(config, group, memory.lend()).map_err(|e| spectrum_error(&e))?;
+    let mut report_side =
+        ReportSide::new(config, group, memory.lend()).map_err(|e| spectrum_error(&e))?;
     let mut binner = Binner::new(group);
     let mut reports = Vec::new();
     for &row in rows {
         if let Some(sample) = binner.push(row)
-            && analyzer.push(sample)
+            && report_side.push(sample)
         {
-            reports.extend(analyzer.report());
+            reports.extend(report_side.report());
         }
     }
     if reports.is_empty() {
-        reports.extend(analyzer.finish());
+        reports.extend(report_side.finish());
     }
     let tones = &case.config.motion.tones;
     let largest = tones.iter().map(|t| t.amplitude_px).fold(0.0, f64::max);

@@ -1,6 +1,6 @@
 //! Days without an end: does anything drift, grow or wrap?
 //!
-//! Samples of a camera of 50 000 lines a second are fed to one analyzer for simulated days. The frame number wraps
+//! Samples of a camera of 50 000 lines a second are fed to one reports for simulated days. The frame number wraps
 //! half-way; the camera's clock has run for thirty years already. One tone, noise and creep; a window of 1 s every 5 s.
 
 use std::f64::consts::TAU;
@@ -9,7 +9,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{RngCore, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rowtone::camera::Timing;
-use rowtone::pipeline::Analyzer;
+use rowtone::pipeline::ReportSide;
 use rowtone::report::Report;
 use rowtone::spectrum::Config;
 use rowtone::timeline::{Group, Sample};
@@ -60,7 +60,7 @@ pub fn run(days: u32, seed: u64, mut on: impl FnMut(&Day)) {
         hop_ns: 5_000_000_000,
         ..Config::default()
     };
-    let mut analyzer = Analyzer::new(config, group, memory.lend()).expect("the memory fits");
+    let mut reports = ReportSide::new(config, group, memory.lend()).expect("the memory fits");
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let normals: Vec<f32> = (0..NORMALS)
         .map(|_| {
@@ -85,7 +85,7 @@ pub fn run(days: u32, seed: u64, mut on: impl FnMut(&Day)) {
         let from = rng.next_u32() as usize % (NORMALS - slots);
         for (slot, (&(s, c), &noise)) in phasors.iter().zip(&normals[from..]).enumerate() {
             let moved = AMPLITUDE_PX * (cos * c - sin * s) + creep;
-            let ready = analyzer.push(Sample {
+            let ready = reports.push(Sample {
                 curvature: Default::default(),
                 frame: first.wrapping_add(n as u32),
                 slot: slot as u16,
@@ -95,13 +95,13 @@ pub fn run(days: u32, seed: u64, mut on: impl FnMut(&Day)) {
                 spread: Default::default(),
                 vertical: None,
             });
-            if ready && let Some(report) = analyzer.report() {
+            if ready && let Some(report) = reports.report() {
                 tally.add(&report, late_ns / 1_000_000);
             }
         }
         if (n + 1) % (DAY_S * FPS) == 0 {
             if n + 1 == frames
-                && let Some(report) = analyzer.finish()
+                && let Some(report) = reports.finish()
             {
                 tally.add(&report, (late_ns + 1_000_000_000 / FPS) / 1_000_000);
             }

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use rowtone::camera::Timing;
-use rowtone::pipeline::Analyzer;
+use rowtone::pipeline::ReportSide;
 use rowtone::report::{Peak, Report};
 use rowtone::spectrum::Config;
 use rowtone::timeline::{Group, Sample};
@@ -282,7 +282,7 @@ impl Scene {
         };
         let mut memory = SpectrumMemory::new(self.group, self.window_s, self.fps);
         let mut analyzer =
-            Analyzer::new(config, self.group, memory.lend()).expect("the memory fits the scene");
+            ReportSide::new(config, self.group, memory.lend()).expect("the memory fits the scene");
         let mut last = None;
         for sample in &self.samples {
             if analyzer.push(*sample) {

@@ -1,6 +1,6 @@
-//! The analyzer's answer beside the truth.
+//! The reports's answer beside the truth.
 
-use rowtone::pipeline::Analyzer;
+use rowtone::pipeline::ReportSide;
 use rowtone::report::{Peak, Report};
 use rowtone::spectrum::Config;
 
@@ -152,10 +152,10 @@ pub fn analyze(scene: &Scene) -> Report {
         ..Config::default()
     };
     let mut memory = SpectrumMemory::new(scene.group, scene.truth.window_s, scene.truth.fps);
-    let mut analyzer =
-        Analyzer::new(config, scene.group, memory.lend()).expect("the memory fits the scene");
+    let mut reports =
+        ReportSide::new(config, scene.group, memory.lend()).expect("the memory fits the scene");
     for sample in &scene.samples {
-        analyzer.push(*sample);
+        reports.push(*sample);
     }
-    analyzer.finish().expect("a scene has samples")
+    reports.finish().expect("a scene has samples")
 }

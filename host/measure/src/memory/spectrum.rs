@@ -7,14 +7,14 @@ use rowtone::timeline::{Group, Spread};
 /// Longest transform, points: that of the core.
 const GRID: usize = 32_768;
 
-/// Vectors to lend to an [`rowtone::pipeline::Analyzer`].
+/// Vectors to lend to an [`rowtone::pipeline::ReportSide`].
 ///
 /// ```
 /// use rowtone_measure::memory::SpectrumMemory;
-/// use rowtone::{pipeline::Analyzer, camera::Timing, spectrum::Config, timeline::Group};
+/// use rowtone::{pipeline::ReportSide, camera::Timing, spectrum::Config, timeline::Group};
 /// let group = Group::new(Timing::new(18_900_000, 500_000, 1080)?, 24)?;
 /// let mut memory = SpectrumMemory::new(group, 1.0, 47.6);
-/// let analyzer = Analyzer::new(Config::default(), group, memory.lend())?;
+/// let reports = ReportSide::new(Config::default(), group, memory.lend())?;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug)]

@@ -1,60 +1,32 @@
-//! One part of the picture, its tracker and the tracker's memory.
+//! One part of the picture, and the line side of the pipeline on it.
 
 use std::ops::Range;
 
 use rowtone::camera::Timing;
-use rowtone::timeline::{Binner, Curvature, Displacement, Sample};
-use rowtone::tracker::{Axes, Config, ConfigError, Counts, Outcome, Tracker};
+use rowtone::pipeline::{LineSide, Reading};
+use rowtone::timeline::{Displacement, Group};
+use rowtone::tracker::{Axes, Config, ConfigError, Outcome};
 
 use crate::memory::TrackerMemory;
 use rowtone_clip::{Frame, Rect};
 use rowtone_failure::Failure;
 
-/// How many lines could not be measured, and why.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Unmeasured {
-    /// Rows without enough texture.
-    pub no_texture: u32,
-    /// Rows that something passed through.
-    pub disturbed: u32,
-    /// Rows too dark beside their reference.
-    pub unlit: u32,
-    /// Rows of copies of the frame before.
-    pub repeated: u32,
-    /// Rows that came while a reference was being learned anew.
-    pub learning: u32,
-}
-
-impl Unmeasured {
-    fn between(before: &Counts, after: &Counts) -> Self {
-        let count = |count: fn(&Counts) -> u64| count(after).wrapping_sub(count(before)) as u32;
-        Self {
-            no_texture: count(|c| c.no_texture) + count(|c| c.misfit),
-            disturbed: count(|c| c.occluded),
-            unlit: count(|c| c.unlit),
-            repeated: count(|c| c.repeated),
-            learning: count(|c| c.learning),
-        }
-    }
-}
-
-impl std::ops::AddAssign for Unmeasured {
-    fn add_assign(&mut self, other: Self) {
-        self.no_texture += other.no_texture;
-        self.disturbed += other.disturbed;
-        self.unlit += other.unlit;
-        self.repeated += other.repeated;
-        self.learning += other.learning;
-    }
-}
-
-/// A tracker on one part of the picture.
+/// A line side on one part of the picture.
 #[derive(Debug)]
 pub struct Engine<'a> {
     part: Rect,
     rows: Range<usize>,
     timing: Timing,
-    tracker: Tracker<'a>,
+    lines: LineSide<'a>,
+}
+
+/// What is wanted of the rows of a part.
+#[derive(Clone, Copy, Debug)]
+pub struct Wanted {
+    /// The axes along which they are measured.
+    pub axes: Axes,
+    /// How they are combined; none where only rows are asked for.
+    pub group: Option<Group>,
 }
 
 /// Fewer rows than this know too little of the rows beside them.
@@ -70,14 +42,14 @@ pub(super) fn axes_of(part: &Rect, wanted: Axes) -> Axes {
 }
 
 impl<'a> Engine<'a> {
-    /// A tracker on `part` of a picture with this timing, along these axes; `memory` is for them. `bits`: of a pixel.
+    /// A line side on `part` of a picture with this timing and this many `bits` a pixel; `memory` is for the axes wanted.
     ///
     /// # Errors
     /// [`Failure::Input`] when the part cannot be measured; `name` stands in front.
     pub fn new(
         part: Rect,
         timing: Timing,
-        axes: Axes,
+        wanted: Wanted,
         bits: u8,
         learn_frames: u16,
         memory: &'a mut TrackerMemory,
@@ -89,16 +61,18 @@ impl<'a> Engine<'a> {
         let config = Config {
             rows: part.height as u16,
             bits,
-            axes,
+            axes: wanted.axes,
             learn_frames,
             ..Config::new(timing, width)
         };
-        let tracker = Tracker::new(config, memory.lend()).map_err(refuse)?;
+        let one_row = || Group::new(timing, 1).map_err(|e| Failure::input(format!("{name}: {e}")));
+        let group = wanted.group.map_or_else(one_row, Ok)?;
+        let lines = LineSide::new(config, group, memory.lend()).map_err(refuse)?;
         Ok(Self {
             part,
             rows: 0..part.height,
             timing,
-            tracker,
+            lines,
         })
     }
 
@@ -111,49 +85,56 @@ impl<'a> Engine<'a> {
     /// Shows the tracker a frame while it learns.
     pub fn learn(&mut self, frame: &Frame) {
         for line in frame.lines(&self.part, &self.timing, self.rows.clone()) {
-            self.tracker.push(&line);
+            self.lines.push_row(&line);
         }
     }
 
     /// Ends a round of learning.
     pub fn end_round(&mut self) {
-        self.tracker.end_round();
-    }
-
-    /// What the tracker says of its rows, for the samples made of them.
-    pub fn curvature(&self) -> Curvature {
-        self.tracker.curvature()
+        self.lines.end_round();
     }
 
     /// A texture that repeats was read at another of its repetitions.
     pub fn slipped(&self) -> bool {
-        self.tracker.slips() > 0
+        self.lines.tracker().slips() > 0
     }
 
     /// Measures every line of a frame and hands what came of it to `take`.
-    pub fn measure(&mut self, frame: &Frame, mut take: impl FnMut(Displacement)) -> Unmeasured {
-        let before = self.tracker.counts();
+    pub fn measure(&mut self, frame: &Frame, mut take: impl FnMut(Displacement)) {
         for line in frame.lines(&self.part, &self.timing, self.rows.clone()) {
-            if let Outcome::Measured(displacement) = self.tracker.push(&line) {
+            if let Outcome::Measured(displacement) = self.lines.push_row(&line) {
                 take(displacement);
             }
         }
-        Unmeasured::between(&before, &self.tracker.counts())
     }
 
-    /// Measures every line of a frame, and hands the groups of rows that `binner` makes of them to `take`.
-    pub fn measure_into(
+    /// Combines rows that [`Engine::measure`] gave, corrected, and hands what comes of them to `take`; the frame ends
+    /// with them.
+    pub fn combine(
         &mut self,
-        frame: &Frame,
-        binner: &mut Binner,
-        mut take: impl FnMut(Sample),
-    ) -> Unmeasured {
-        let before = self.tracker.counts();
-        for line in frame.lines(&self.part, &self.timing, self.rows.clone()) {
-            if let Some(sample) = self.tracker.push_into(&line, binner) {
-                take(sample);
+        rows: impl IntoIterator<Item = Displacement>,
+        mut take: impl FnMut(Reading),
+    ) {
+        for row in rows {
+            if let Some(reading) = self.lines.bin(row) {
+                take(reading);
             }
         }
-        Unmeasured::between(&before, &self.tracker.counts())
+        self.end_frame(take);
+    }
+
+    /// Measures every line of a frame, and hands what comes of its groups of rows to `take`.
+    pub fn measure_into(&mut self, frame: &Frame, mut take: impl FnMut(Reading)) {
+        for line in frame.lines(&self.part, &self.timing, self.rows.clone()) {
+            if let Some(reading) = self.lines.push(&line) {
+                take(reading);
+            }
+        }
+        self.end_frame(take);
+    }
+
+    /// No group reaches over the end of a frame, and a frame without any group has its tally all the same.
+    fn end_frame(&mut self, mut take: impl FnMut(Reading)) {
+        take(self.lines.finish().unwrap_or_else(|| self.lines.rest()));
     }
 }

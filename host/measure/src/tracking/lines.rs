@@ -3,10 +3,10 @@
 use std::panic::resume_unwind;
 use std::thread;
 
-use rowtone::timeline::{Binner, Displacement, Group};
+use rowtone::timeline::{Displacement, Group};
 
 use super::region::{self, Region};
-use super::{Ending, Engine, FrameShifts, background};
+use super::{Ending, Engine, FrameShifts, Wanted, background};
 use crate::memory::TrackerMemory;
 use rowtone_clip::ring::Outlet;
 use rowtone_clip::{Camera, Feed, Frame, Rect};
@@ -49,15 +49,28 @@ fn measure_all(
         )));
     }
     let whole = Region::whole(&part);
-    let mut lines = Lines::new(feed, part, &whole, &mut memory, still_memory.as_mut())?;
+    let mut lines = Lines::new(
+        feed,
+        part,
+        &whole,
+        groups,
+        &mut memory,
+        still_memory.as_mut(),
+    )?;
     let region = lines.learn_roughly_and_choose(&feed.camera, &kept, &part);
     let mut notes = std::mem::take(&mut feed.notes);
     if region != whole {
         notes.push(told(&region, &feed.camera));
-        lines = Lines::new(feed, part, &region, &mut memory, still_memory.as_mut())?;
+        lines = Lines::new(
+            feed,
+            part,
+            &region,
+            groups,
+            &mut memory,
+            still_memory.as_mut(),
+        )?;
         lines.learn_roughly(&kept);
     }
-    lines.binner = groups.map(Binner::new);
     lines.learn(&kept, 1);
     let note = (!notes.is_empty()).then(|| notes.join("\n"));
     lines.run(feed, kept, more, note, to)
@@ -102,8 +115,8 @@ struct Lines<'a> {
     still: Option<Engine<'a>>,
     /// The background's rows of this frame.
     still_rows: Vec<Displacement>,
-    /// Where rows are combined.
-    binner: Option<Binner>,
+    /// Rows are combined to readings.
+    combines: bool,
     /// That stripes were mistaken was told.
     slips_told: bool,
 }
@@ -116,15 +129,17 @@ impl<'a> Lines<'a> {
         feed: &Feed,
         part: Rect,
         region: &Region,
+        groups: Option<Group>,
         memory: &'a mut TrackerMemory,
         still_memory: Option<&'a mut TrackerMemory>,
     ) -> Result<Self, Failure> {
         let camera = &feed.camera;
         let learn = LEARN_FRAMES as u16;
         let axes = super::axes_of_both(&part, camera);
-        let engine = |part, memory| {
+        let engine = |part, group, memory| {
             let (timing, bits) = (camera.timing, camera.bits);
-            Engine::new(part, timing, axes, bits, learn, memory, &feed.name)
+            let wanted = Wanted { axes, group };
+            Engine::new(part, timing, wanted, bits, learn, memory, &feed.name)
         };
         let columns = Rect {
             x: region.columns.start,
@@ -132,16 +147,16 @@ impl<'a> Lines<'a> {
             ..part
         };
         let first = region.rows.start - part.y;
-        let moving = engine(columns, memory)?.only_rows(first..first + region.rows.len());
+        let moving = engine(columns, groups, memory)?.only_rows(first..first + region.rows.len());
         let still = match (camera.background, still_memory) {
-            (Some(part), Some(memory)) => Some(engine(part, memory)?),
+            (Some(part), Some(memory)) => Some(engine(part, None, memory)?),
             _ => None,
         };
         Ok(Self {
             moving,
             still,
             still_rows: Vec::new(),
-            binner: None,
+            combines: groups.is_some(),
             slips_told: false,
         })
     }
@@ -219,25 +234,23 @@ impl<'a> Lines<'a> {
         shifts.start_ns = frame.start_ns;
         shifts.note = note;
         shifts.rows.clear();
-        shifts.samples.clear();
-        if let Some(binner) = &mut self.binner {
-            binner.set_curvature(self.moving.curvature());
-        }
-        let (rows, samples) = (&mut shifts.rows, &mut shifts.samples);
-        match (&mut self.still, &mut self.binner) {
-            (None, Some(binner)) => {
-                let take = |sample| samples.push(sample);
-                shifts.unmeasured = self.moving.measure_into(&frame, binner, take);
+        shifts.readings.clear();
+        let (rows, readings) = (&mut shifts.rows, &mut shifts.readings);
+        match &mut self.still {
+            None if self.combines => {
+                self.moving
+                    .measure_into(&frame, |reading| readings.push(reading));
             }
-            (still, binner) => {
-                shifts.unmeasured = self.moving.measure(&frame, |row| rows.push(row));
+            still => {
+                self.moving.measure(&frame, |row| rows.push(row));
                 if let Some(still) = still {
                     self.still_rows.clear();
                     still.measure(&frame, |row| self.still_rows.push(row));
                     background::subtract(rows, &self.still_rows);
                 }
-                if let Some(binner) = binner {
-                    samples.extend(rows.drain(..).filter_map(|row| binner.push(row)));
+                if self.combines {
+                    self.moving
+                        .combine(rows.drain(..), |reading| readings.push(reading));
                 }
             }
         }
@@ -245,8 +258,6 @@ impl<'a> Lines<'a> {
             self.slips_told = true;
             shifts.note = Some(SLIPPED.to_owned());
         }
-        // No group reaches over the end of a frame.
-        samples.extend(self.binner.as_mut().and_then(Binner::finish));
         feed.recycle(frame);
         to.put(shifts)
     }

@@ -12,11 +12,12 @@ mod engine;
 mod lines;
 pub mod region;
 
-use rowtone::timeline::{Displacement, Group, Sample};
+use rowtone::pipeline::Reading;
+use rowtone::timeline::{Displacement, Group};
 use rowtone::tracker::Axes;
 
 pub use background::subtract;
-pub use engine::{Engine, Unmeasured};
+pub use engine::{Engine, Wanted};
 
 use crate::memory::TrackerMemory;
 use rowtone_clip::ring::{Inlet, Next, ring};
@@ -39,10 +40,8 @@ pub struct FrameShifts {
     /// Rows that were measured, from the top of the part, the background's motion subtracted; none where
     /// they are combined.
     pub rows: Vec<Displacement>,
-    /// The rows combined, where that was asked for.
-    pub samples: Vec<Sample>,
-    /// Rows that were not measured.
-    pub unmeasured: Unmeasured,
+    /// The rows combined, where that was asked for, and what became of the frame's rows.
+    pub readings: Vec<Reading>,
     /// Something to tell the user at once, a line each.
     note: Option<String>,
 }
@@ -99,7 +98,8 @@ impl Shifts {
         for part in [Some(part), camera.background].into_iter().flatten() {
             let mut memory = TrackerMemory::for_axes(part.width, part.height, axes);
             let (timing, bits) = (camera.timing, camera.bits);
-            Engine::new(part, timing, axes, bits, 1, &mut memory, &name)?;
+            let wanted = Wanted { axes, group: None };
+            Engine::new(part, timing, wanted, bits, 1, &mut memory, &name)?;
         }
         std::thread::spawn(move || lines::run(feed, part, groups, outlet));
         Ok(Self {
