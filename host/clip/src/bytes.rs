@@ -3,7 +3,7 @@
 use std::ops::{Deref, Range};
 use std::sync::Arc;
 
-use memmap2::Mmap;
+use super::window::Window;
 
 /// A frame's bytes, marker and all: in memory of their own, or in a window of a file.
 #[derive(Debug)]
@@ -11,10 +11,18 @@ pub(super) enum Bytes {
     /// Copied here.
     Read(Vec<u8>),
     /// Part of a window, which stays mapped for as long as a frame holds it.
-    Mapped(Arc<Mmap>, Range<usize>),
+    Mapped(Arc<Window>, Range<usize>),
 }
 
 impl Bytes {
+    /// The file was cut short, and zeros were read where pages of these bytes were.
+    pub(super) fn are_cut(&self) -> bool {
+        match self {
+            Self::Read(_) => false,
+            Self::Mapped(window, _) => window.is_cut(),
+        }
+    }
+
     /// A buffer to read into, that of the frame before if there was one.
     pub(super) fn buffer(&mut self) -> &mut Vec<u8> {
         if let Self::Mapped(..) = self {

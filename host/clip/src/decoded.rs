@@ -32,6 +32,7 @@ impl Decoded {
                 width: probe.width.into(),
                 height: probe.height.into(),
                 fps: probe.fps,
+                unusable_rate: None,
                 format: PixelFormat::luma(Luma::of(&probe.pixel_format).bits),
             },
             video,

@@ -199,6 +199,14 @@ impl Feed {
         }
     }
 
+    /// What is wrong with a frame that was cut off while it was read.
+    pub fn cut_short(&self, frame: &Frame) -> Failure {
+        Failure::input(format!(
+            "{}: was cut short by another program while it was read, at frame {}",
+            self.name, frame.number
+        ))
+    }
+
     /// Gives a frame's buffers back. A frame that is kept is replaced by a new one.
     pub fn recycle(&mut self, frame: Frame) {
         self.inlet.recycle(frame);

@@ -66,6 +66,11 @@ impl Frame {
         }
     }
 
+    /// The file was cut short while this frame was read: some of it is zeros in place of pixels.
+    pub fn is_cut(&self) -> bool {
+        self.raw.are_cut()
+    }
+
     /// The luma plane of the (turned) picture.
     fn plane(&self) -> Pixels<'_> {
         match self.plane {

@@ -26,6 +26,7 @@ pub mod pts;
 mod recording;
 pub mod ring;
 mod source;
+mod window;
 pub mod y4m;
 
 pub use clock::{Clock, Stamped, Times};

@@ -9,13 +9,14 @@ use std::fs::File;
 use std::io;
 use std::sync::Arc;
 
-use memmap2::{Mmap, MmapOptions};
+use memmap2::MmapOptions;
 
 use super::Header;
 use super::bytes::Bytes;
 #[cfg(target_os = "linux")]
 use super::populate::Populate;
 use super::source::FrameSource;
+use super::window::Window;
 use super::y4m::{Layout, Next, Reader};
 use rowtone_failure::Failure;
 
@@ -38,6 +39,7 @@ impl MappedReader {
         let (file, layout) = reader.parts();
         let mut windows = Windows {
             file: file.try_clone()?,
+            length: 0,
             at: reader.header_bytes() as u64,
             start: 0,
             window: None,
@@ -91,10 +93,12 @@ impl FrameSource for MappedReader {
 #[derive(Debug)]
 struct Windows {
     file: File,
+    /// Bytes of the file when it was last asked.
+    length: u64,
     /// Position in the file of the next byte, and of the window's first.
     at: u64,
     start: u64,
-    window: Option<Arc<Mmap>>,
+    window: Option<Arc<Window>>,
     #[cfg(target_os = "linux")]
     populate: Populate,
 }
@@ -131,7 +135,12 @@ impl Windows {
     /// Opens a window of at least `count` bytes at the present position; fewer at the end of the file.
     fn map(&mut self, count: usize) -> io::Result<()> {
         // Asked anew for each window: a recording may still be growing.
-        let left = self.file.metadata()?.len().saturating_sub(self.at);
+        let length = self.file.metadata()?.len();
+        if length < self.length {
+            return Err(io::Error::other("another program has cut the file short"));
+        }
+        self.length = length;
+        let left = length.saturating_sub(self.at);
         let left = usize::try_from(left).unwrap_or(usize::MAX);
         let length = left.min(count.max(WINDOW_BYTES));
         self.start = self.at;
@@ -141,15 +150,15 @@ impl Windows {
         }
         // SAFETY: the window is only read, as bytes of which any value will do. Where another program
         // changes the file meanwhile, pixels change and nothing else. Where it cuts the file short, a
-        // page that is not there any more is found by `Populate`, as an error; only a cut in the moment
-        // between there and the line, some milliseconds of a file that is at the same time read and
-        // thrown away, ends this program with a bus error.
+        // page that is not there any more is found by `Populate`, as an error; one that goes later reads
+        // as zeros, and `Window` knows.
         let window = unsafe {
             MmapOptions::new()
                 .offset(self.at)
                 .len(length)
                 .map(&self.file)?
         };
+        let window = Window::new(window)?;
         #[cfg(target_os = "linux")]
         self.populate.all(&window)?;
         self.window = Some(Arc::new(window));
@@ -217,6 +226,32 @@ mod tests {
             let [read, mapped] = both(bytes.as_bytes(), &format!("mapped-{n}"));
             assert_eq!(read, mapped, "{tail:?}");
         }
+    }
+
+    #[test]
+    fn a_file_that_is_cut_short_is_an_error() {
+        let path = std::env::temp_dir().join(format!("rowtone-{}-shorter", std::process::id()));
+        let mut bytes = b"YUV4MPEG2 W2500 H1500 Cmono\n".to_vec();
+        for k in 0..5u8 {
+            bytes.extend(b"FRAME\n");
+            bytes.extend(std::iter::repeat_n(k, 2500 * 1500));
+        }
+        std::fs::write(&path, &bytes).unwrap();
+        let file = File::options().read(true).write(true).open(&path).unwrap();
+        std::fs::remove_file(&path).unwrap();
+        let reader = Reader::open(file.try_clone().unwrap(), "clip").unwrap();
+        let mut mapped = MappedReader::new(&reader).unwrap();
+        let mut frame = Bytes::default();
+        assert!(matches!(
+            mapped.next_frame(&mut frame),
+            Ok(Next::Frame { .. })
+        ));
+        file.set_len(1 << 16).unwrap();
+        assert!(!frame.are_cut());
+        assert_eq!(frame.last(), Some(&0));
+        assert!(frame.are_cut() || cfg!(not(target_os = "linux")));
+        let error = mapped.next_frame(&mut Bytes::default()).unwrap_err();
+        assert!(error.to_string().contains("cut the file short"), "{error}");
     }
 
     #[test]

@@ -8,6 +8,7 @@ use rowtone::tracker::Axes;
 
 use super::clock::{Clock, Stamped, Times};
 use super::ffmpeg::Probe;
+use super::header::FPS;
 use super::{About, Header, Rect, Roi, Turn, calibration, decoded, ffmpeg, pts};
 use rowtone_failure::Failure;
 
@@ -30,7 +31,7 @@ pub struct CameraArgs {
     #[arg(value_name = "INPUT", help_heading = None)]
     pub input: String,
     /// Frame rate, Hz, whatever the file says: slow motion states the rate it is played at [default: the file's]
-    #[arg(long, value_name = "F", value_parser = positive, allow_negative_numbers = true)]
+    #[arg(long, value_name = "F", value_parser = frame_rate, allow_negative_numbers = true)]
     pub fps: Option<f64>,
     /// Start of exposure of every frame: timecode format v2, ms [default: the file's times, else frame number / fps]
     #[arg(long, value_name = "FILE")]
@@ -84,6 +85,12 @@ fn axes(text: &str) -> Result<Axes, String> {
         "xy" => Ok(Axes::Xy),
         _ => Err("want x or xy".to_owned()),
     }
+}
+
+/// A frame rate, Hz.
+fn frame_rate(text: &str) -> Result<f64, String> {
+    number(text, |fps| FPS.contains(&fps))
+        .ok_or_else(|| format!("want a frame rate from {} to {} Hz", FPS.start(), FPS.end()))
 }
 
 /// A finite number above 0.
@@ -224,10 +231,11 @@ impl CameraArgs {
     pub fn clock(&self, header: &Header, about: &About) -> Result<Clock, Failure> {
         let fps = self.fps.or(header.fps);
         let no_rate = || {
-            Failure::input(format!(
-                "{}: the header gives no frame rate: give --fps F",
-                self.name()
-            ))
+            let why = match &header.unusable_rate {
+                Some(rate) => format!("the header's frame rate F{rate} is none of a camera"),
+                None => "the header gives no frame rate".to_owned(),
+            };
+            Failure::input(format!("{}: {why}: give --fps F", self.name()))
         };
         if let Some(path) = &self.pts {
             let times = pts::read(path)?;

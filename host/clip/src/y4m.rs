@@ -126,7 +126,10 @@ impl<R: Read> Reader<R> {
         let text = line.strip_suffix(b"\n").unwrap_or(&line);
         let header = Header::parse(text).map_err(say)?;
         if text.len() == line.len() {
-            return Err(say("the file ends inside its header".to_owned()));
+            return Err(say(match line.len() {
+                LONGEST_LINE => format!("its header is longer than {LONGEST_LINE} bytes"),
+                _ => "the file ends inside its header".to_owned(),
+            }));
         }
         let layout = Layout {
             name: name.to_owned(),
@@ -290,6 +293,9 @@ mod tests {
         assert!(refusal(b"YUV4MPEG2 W99999 H2\n").contains("no usable size"));
         assert!(refusal(b"YUV4MPEG2 W2 H2 It\n").contains("interlaced"));
         assert!(refusal(b"YUV4MPEG2 W2 H2 Crgb\n").contains("Crgb"));
+        assert!(refusal(b"YUV4MPEG2 W2 H2\r\n").contains("CRLF"));
+        let long = [&b"YUV4MPEG2 W2 H2 X"[..], &[b'a'; LONGEST_LINE], b"\n"].concat();
+        assert!(refusal(&long).contains("longer than 4096 bytes"));
     }
 
     #[test]
@@ -297,6 +303,27 @@ mod tests {
         let header = Header::parse(b"YUV4MPEG2 W2 H2 F0:0").unwrap();
         assert_eq!(header.fps, None);
         assert_eq!(header.format, PixelFormat::DEFAULT);
+    }
+
+    #[test]
+    fn a_comment_may_be_in_any_encoding() {
+        let header = Header::parse(b"YUV4MPEG2 W2 H2 F60:1 Xcaf\xe9 Cmono").unwrap();
+        assert_eq!((header.fps, header.format.bits), (Some(60.0), 8));
+    }
+
+    #[test]
+    fn a_rate_that_no_camera_has_is_named() {
+        for (text, fps, unusable) in [
+            ("F60000:1001", Some(60000.0 / 1001.0), None),
+            ("F0:0", None, None),
+            ("F99999999999:1", None, Some("99999999999:1")),
+            ("F1:99999999", None, Some("1:99999999")),
+            ("F60", None, Some("60")),
+        ] {
+            let header = Header::parse(format!("YUV4MPEG2 W2 H2 {text}").as_bytes()).unwrap();
+            assert_eq!(header.fps, fps, "{text}");
+            assert_eq!(header.unusable_rate.as_deref(), unusable, "{text}");
+        }
     }
 
     #[test]

@@ -195,6 +195,11 @@ impl<'a> Analysis<'a> {
         outcome
     }
 
+    /// What to say when no row of the recording could be measured.
+    pub fn nothing_measured(&self) -> Failure {
+        self.shifts.nothing_measured()
+    }
+
     /// Something to tell the user after the last frame.
     pub fn warning(&self) -> Option<&str> {
         self.shifts.warning()

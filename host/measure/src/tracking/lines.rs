@@ -72,6 +72,9 @@ fn measure_all(
         lines.learn_roughly(&kept);
     }
     lines.learn(&kept, 1);
+    if let Some(cut) = kept.iter().find(|frame| frame.is_cut()) {
+        return Err(feed.cut_short(cut));
+    }
     let note = (!notes.is_empty()).then(|| notes.join("\n"));
     lines.run(feed, kept, more, note, to)
 }
@@ -201,14 +204,14 @@ impl<'a> Lines<'a> {
         to: &mut Outlet<FrameShifts, Ending>,
     ) -> Ending {
         for frame in kept {
-            if !self.measure(feed, frame, note.take(), to) {
+            if !self.measure(feed, frame, note.take(), to)? {
                 return Ok(None);
             }
         }
         while let Ok(true) = more {
             match feed.next_frame() {
                 Ok(Some(frame)) => {
-                    if !self.measure(feed, frame, None, to) {
+                    if !self.measure(feed, frame, None, to)? {
                         return Ok(None);
                     }
                 }
@@ -220,15 +223,18 @@ impl<'a> Lines<'a> {
     }
 
     /// Measures a frame and sends what came of it. `false` when nobody listens any more.
+    ///
+    /// # Errors
+    /// When the frame was cut off while it was read: nothing of it is sent.
     fn measure(
         &mut self,
         feed: &mut Feed,
         frame: Frame,
         note: Option<String>,
         to: &mut Outlet<FrameShifts, Ending>,
-    ) -> bool {
+    ) -> Result<bool, Failure> {
         let Some(mut shifts) = to.spare() else {
-            return false;
+            return Ok(false);
         };
         shifts.number = frame.number;
         shifts.start_ns = frame.start_ns;
@@ -258,7 +264,10 @@ impl<'a> Lines<'a> {
             self.slips_told = true;
             shifts.note = Some(SLIPPED.to_owned());
         }
+        if frame.is_cut() {
+            return Err(feed.cut_short(&frame));
+        }
         feed.recycle(frame);
-        to.put(shifts)
+        Ok(to.put(shifts))
     }
 }

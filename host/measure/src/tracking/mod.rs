@@ -30,6 +30,9 @@ const BLOCKS: usize = 4;
 /// Frames of a block, where nobody waits for each.
 const BLOCK_FRAMES: usize = 32;
 
+/// A part narrower than this has hardly a column whose surroundings stay in it while it moves, px.
+const NARROW_PX: usize = 32;
+
 /// What the lines of one frame came to.
 #[derive(Debug, Default)]
 pub struct FrameShifts {
@@ -137,6 +140,20 @@ impl Shifts {
             }
             Next::Gone => Ok(None),
         }
+    }
+
+    /// What to say when no row of the recording could be measured.
+    pub fn nothing_measured(&self) -> Failure {
+        let Rect { width, height, .. } = self.part;
+        let why = if width < NARROW_PX {
+            format!(
+                "the part of {width}x{height} px is too narrow, since some ten columns at either edge only \
+                 tell what moves in: make it at least {NARROW_PX} px wide (--roi)"
+            )
+        } else {
+            "the picture has too little texture across: edges, print, scratches or speckle are what moves".to_owned()
+        };
+        Failure::input(format!("{}: no row could be measured: {why}", self.name))
     }
 
     /// Gives a frame's buffers back.
