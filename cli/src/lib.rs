@@ -1,7 +1,9 @@
 //! The command `rowtone`: its commands and what they print.
 //!
 //! - [`commands`]: one file a command, each with its options and what it does;
-//! - [`output`]: displacements as files, standard output line by line, progress.
+//! - [`output`]: displacements as files, standard output line by line, progress;
+//! - [`stop`]: what a signal does.
 
 pub mod commands;
 pub mod output;
+pub mod stop;

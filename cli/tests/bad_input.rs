@@ -158,8 +158,152 @@ fn command_lines_that_are_wrong() {
 }
 
 #[test]
+fn a_header_s_faults_have_their_own_words() {
+    let honest = y4m(config(60));
+    let end = honest.iter().position(|&b| b == b'\n').unwrap();
+    let with = |name: &str, header: &[u8]| {
+        on_clip(
+            "analyze",
+            &file(name, &[header, &honest[end..]].concat()),
+            &["--format", "json"],
+        )
+    };
+    let header = &honest[..end];
+    let latin = with("latin.y4m", &[header, b" Xcaf\xe9"].concat());
+    common::assert_the_tone(&reports(&texts(&latin).0)[0]);
+    let crlf = with("crlf.y4m", &[header, b"\r"].concat());
+    assert_failure(&crlf, 1, &["CRLF", "copied as text"]);
+    let long = with("long.y4m", &[header, b" X", &[b'x'; 5000]].concat());
+    assert_failure(&long, 1, &["longer than 4096 bytes"]);
+    let fast = with("fast.y4m", b"YUV4MPEG2 W96 H120 F99999999999:1 Cmono");
+    assert_failure(&fast, 1, &["F99999999999:1", "--fps"]);
+}
+
+#[test]
+fn times_and_exposures_that_cannot_be_right() {
+    let clip = file("times.y4m", &y4m(config(60)));
+    let times = |name: &str, unit: f64, count: u32| {
+        let text: String = (0..count)
+            .map(|i| format!("{:.3}\n", f64::from(i) * unit / 60.0))
+            .collect();
+        let path = file(name, text.as_bytes());
+        on_clip("analyze", &clip, &["--pts", path.to_str().unwrap()])
+    };
+    assert_failure(
+        &times("us.pts", 1e6, 60),
+        1,
+        &["us.pts", "microseconds", "milliseconds"],
+    );
+    assert_failure(
+        &times("ns.pts", 1e9, 60),
+        1,
+        &["ns.pts", "nanoseconds", "milliseconds"],
+    );
+    assert_failure(&times("more.pts", 1e3, 65), 1, &["65 times", "60 frames"]);
+    assert_failure(
+        &times("fewer.pts", 1e3, 50),
+        1,
+        &["only 50 times", "60 frames"],
+    );
+    let no_text = on_clip("analyze", &clip, &["--pts", clip.to_str().unwrap()]);
+    assert_failure(&no_text, 1, &["--pts", "no text"]);
+    let exposed = |us: &str| {
+        let args = [
+            "analyze",
+            clip.to_str().unwrap(),
+            "--line-time-us",
+            "100",
+            "--exposure-us",
+            us,
+        ];
+        command(args).output().unwrap()
+    };
+    assert_failure(&exposed("20000"), 2, &["exposure", "longer than a frame"]);
+    let short = command(["analyze", clip.to_str().unwrap(), "--line-time-us", "0.1"])
+        .output()
+        .unwrap();
+    assert_failure(&short, 2, &["--line-time-us 0.1", "µs"]);
+}
+
+/// As many times as frames is asked of a pipe too, where it shows only at the end.
+#[test]
+fn more_times_than_frames_of_a_pipe() {
+    let text: String = (0..65)
+        .map(|i| format!("{:.3}\n", f64::from(i) * 1e3 / 60.0))
+        .collect();
+    let pts = file("more-piped.pts", text.as_bytes());
+    let args = [
+        "analyze",
+        "-",
+        "--format",
+        "json",
+        "--pts",
+        pts.to_str().unwrap(),
+    ];
+    let mut child = command(args.iter().chain(&CAMERA))
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    child
+        .stdin
+        .take()
+        .unwrap()
+        .write_all(&y4m(config(60)))
+        .unwrap();
+    let output = child.wait_with_output().unwrap();
+    assert_failure(&output, 1, &["65 times", "60 frames"]);
+    common::assert_the_tone(&reports(&texts(&output).0)[0]);
+}
+
+/// An exposure that nobody gave is warned of in every report for programs, and once for people.
+#[test]
+fn an_exposure_that_is_not_known_is_told() {
+    let clip = file("unexposed.y4m", &y4m(config(120)));
+    let run = |more: &[&str]| {
+        let args = [
+            &["analyze", clip.to_str().unwrap(), "--line-time-us", "100"],
+            more,
+        ]
+        .concat();
+        let (stdout, stderr) = texts(&command(args).output().unwrap());
+        assert!(stderr.is_empty(), "{stderr}");
+        stdout
+    };
+    for report in reports(&run(&["--format", "json"])) {
+        let warnings = report["warnings"].as_array().unwrap();
+        assert!(warnings.contains(&"exposure_unknown".into()), "{report}");
+    }
+    assert_eq!(run(&[]).matches("the exposure is unknown").count(), 1);
+    assert!(!run(&["--exposure-us", "0"]).contains("exposure"));
+}
+
+#[test]
+fn a_part_too_narrow_is_told_with_what_is_enough() {
+    let mut soft = config(60);
+    soft.sensor.cols = 16;
+    soft.optics.blur_px = 3.0;
+    let narrow = on_clip("analyze", &file("narrow-part.y4m", &y4m(soft)), &[]);
+    assert_failure(&narrow, 1, &["16x120 px is too narrow", "32 px wide"]);
+    let grey = [
+        b"YUV4MPEG2 W96 H120 F60:1 Cmono\n".as_slice(),
+        &[b"FRAME\n".as_slice(), &[90; 96 * 120]].concat().repeat(30),
+    ]
+    .concat();
+    let grey = on_clip("analyze", &file("grey.y4m", &grey), &[]);
+    assert_failure(&grey, 1, &["too little texture"]);
+}
+
+#[test]
 fn help_and_version_are_results() {
-    for args in [&["--help"] as &[_], &["analyze", "--help"], &["--version"]] {
+    for args in [
+        &["--help"] as &[_],
+        &["help"],
+        &["help", "analyze"],
+        &["analyze", "--help"],
+        &["--version"],
+    ] {
         let output = command(args).output().unwrap();
         let (stdout, stderr) = texts(&output);
         assert!(output.status.success() && stderr.is_empty());

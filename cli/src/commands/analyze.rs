@@ -11,6 +11,7 @@ use crate::output::Out;
 use crate::output::progress::Progress;
 use rowtone_clip::{CameraArgs, Feed};
 use rowtone_failure::Failure;
+use rowtone_files::WholeFile;
 use rowtone_measure::analysis::{Analysis, Event, Plan, Settings};
 use rowtone_measure::tracking::Shifts;
 use rowtone_plot::Picture;
@@ -93,10 +94,11 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             "--min-hz {min} must be below --max-hz {max}"
         )));
     }
-    // A wrong ending is said before anything is measured.
-    args.plot
-        .as_deref()
-        .map_or(Ok(()), rowtone_plot::check_ending)?;
+    // What cannot be written is said before anything is measured.
+    if let Some(path) = &args.plot {
+        rowtone_plot::check_ending(path)?;
+        WholeFile::check(path).map_err(|e| Failure::writing(&path.display().to_string(), &e))?;
+    }
     let session = session();
     let serial = args.serial.as_ref().map(|port| {
         // What comes through a pipe may be live, and does not wait.
@@ -104,7 +106,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         Sender::open(port, session, &as_a_board_says(args), may_wait)
     });
     let serial = serial.transpose()?;
-    let feed = Feed::open(&args.camera)?;
+    let mut feed = Feed::open(&args.camera)?;
+    feed.stop_when(crate::stop::on_signals());
     let plan = Plan::new(
         &feed.camera,
         &Settings {
@@ -150,10 +153,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let closed = outlets.close();
     outcome.and(closed)?;
     if nothing {
-        return Err(Failure::input(format!(
-            "{}: no row could be measured: the picture has too little texture across",
-            args.camera.name()
-        )));
+        return Err(analysis.nothing_measured());
     }
     Ok(())
 }

@@ -1,6 +1,5 @@
 //! `rowtone displacement`: the motion itself, over time.
 
-use std::fs::File;
 use std::io::{self, BufWriter, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
@@ -12,6 +11,7 @@ use crate::output::series::{Measured, Series, Shift};
 use crate::output::wav;
 use rowtone_clip::{Camera, CameraArgs, Feed};
 use rowtone_failure::Failure;
+use rowtone_files::WholeFile;
 use rowtone_measure::restore::Method;
 use rowtone_measure::restore::long::{Restoration, USUAL_CORNER_HZ};
 use rowtone_measure::tracking::{FrameShifts, Shifts};
@@ -22,10 +22,13 @@ const LEAST_CONDITIONED: f64 = 3e-3;
 /// Samples a second that `--rows-per-sample` aims at when it is not given.
 const USUAL_RATE_HZ: f64 = 8000.0;
 
+/// Longest time without a frame that a sound bridges, s.
+const MOST_GAP_S: f64 = 60.0;
+
 /// Options of `rowtone displacement`.
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Example:\n  rowtone displacement clip.y4m --line-time-us 18.9 -o motion.csv\n\n\
+    after_help = "Example:\n  rowtone displacement clip.mp4 --line-time-us 18.9 -o motion.csv\n\n\
     CSV: t_s,row,x_px,x_sd_px,y_px,y_sd_px; with --axes x: t_s,row,d_px,sd_px. t_s is the middle of the \
     sample's exposure, row its first row in the (turned) picture; x is to the right, y downwards; what could \
     not be measured is empty. Each row's mean over \
@@ -82,14 +85,25 @@ impl Args {
         }
     }
 
-    fn format(&self) -> Format {
-        let ending = self.output.as_ref().and_then(|path| path.extension());
-        self.format
-            .unwrap_or(match ending.and_then(|ending| ending.to_str()) {
-                Some("wav") => Format::Wav,
-                Some("npy") => Format::Npy,
-                _ => Format::Csv,
-            })
+    /// What was asked for, or what the ending of -o says.
+    fn format(&self) -> Result<Format, Failure> {
+        let (None, Some(path)) = (self.format, &self.output) else {
+            return Ok(self.format.unwrap_or(Format::Csv));
+        };
+        let ending = path
+            .extension()
+            .map(|ending| ending.to_string_lossy().to_lowercase());
+        match ending.as_deref() {
+            Some("wav") => Ok(Format::Wav),
+            Some("npy") => Ok(Format::Npy),
+            Some("csv" | "txt") | None => Ok(Format::Csv),
+            // A device or a pipe has no ending to speak of.
+            Some(_) if path.metadata().is_ok_and(|meta| !meta.is_file()) => Ok(Format::Csv),
+            Some(other) => Err(Failure::usage(format!(
+                "-o {}: .{other} is none of csv, wav and npy: give such an ending, or --format",
+                path.display()
+            ))),
+        }
     }
 }
 
@@ -98,7 +112,10 @@ impl Args {
 /// # Errors
 /// [`Failure`] as every command; what was measured before an input became unusable is still written.
 pub fn run(args: &Args) -> Result<(), Failure> {
-    let format = args.format();
+    let format = args.format()?;
+    if let Some(path) = &args.output {
+        WholeFile::check(path).map_err(|e| Failure::writing(&path.display().to_string(), &e))?;
+    }
     if args.output.is_none() && format != Format::Csv && io::stdout().is_terminal() {
         return Err(Failure::usage(
             "this format is not for a terminal: give -o FILE",
@@ -109,9 +126,17 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             "--fill and --low-pass-hz are for WAV: CSV and NPY hold what was measured",
         ));
     }
-    let mut shifts = Shifts::start(Feed::open(&args.camera)?, None)?;
+    let mut feed = Feed::open(&args.camera)?;
+    feed.stop_when(crate::stop::on_signals());
+    let mut shifts = Shifts::start(feed, None)?;
     let rows_per_sample = rows_per_sample(args.rows_per_sample, &shifts);
     let slots = shifts.part.height.div_ceil(rows_per_sample);
+    if format == Format::Wav && slots > 1 && shifts.camera.timing.is_global_shutter() {
+        return Err(Failure::usage(
+            "--rows-per-sample: a global shutter exposes all rows at once, and a sound has one value a time: \
+             leave it out",
+        ));
+    }
     let mut series = Series::new(shifts.part.y, rows_per_sample, slots, shifts.axes);
     let outcome = collect(&mut shifts, &mut series);
     if let Some(warning) = shifts.warning() {
@@ -131,10 +156,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             eprintln!("rowtone: {}: {note}", shifts.name);
         }
         if series.measured() == 0 {
-            return outcome.and(Err(Failure::input(format!(
-                "{}: no row could be measured: the picture has too little texture across",
-                shifts.name
-            ))));
+            return outcome.and(Err(shifts.nothing_measured()));
         }
     }
     outcome
@@ -256,14 +278,36 @@ fn write(args: &Args, format: Format, series: &Series, rate_hz: u32) -> Result<(
     let place = args.output.as_deref();
     let name = place.map_or("standard output".to_owned(), |p| p.display().to_string());
     let written = match format {
-        Format::Csv => write_to(place, |to| series.write_csv(to, um_per_px)),
-        Format::Npy => write_to(place, |to| series.write_npy(to)),
+        Format::Csv => write_to(place, |mut to| series.write_csv(&mut to, um_per_px)),
+        Format::Npy => write_to(place, |mut to| series.write_npy(&mut to)),
         Format::Wav => {
+            check_sound(&name, series, rate_hz)?;
             let sound = sound(series, rate_hz, &args.restoration());
-            write_to(place, |to| wav::write(to, rate_hz, &sound))
+            write_to(place, |mut to| wav::write(&mut to, rate_hz, &sound))
         }
     };
     written.map_err(|e| Failure::writing(&name, &e))
+}
+
+/// Whether the recording makes a sound of a sensible length.
+fn check_sound(name: &str, series: &Series, rate_hz: u32) -> Result<(), Failure> {
+    if let Some((at_s, gap_s)) = series
+        .longest_gap()
+        .filter(|(_, gap_s)| *gap_s > MOST_GAP_S)
+    {
+        return Err(Failure::input(format!(
+            "{name}: there is no frame for {gap_s:.0} s after {at_s:.3} s, and a sound would fill that with \
+             what was never measured: write CSV or NPY, or cut the recording there"
+        )));
+    }
+    let samples = series.duration_s() * f64::from(rate_hz);
+    if samples < wav::MOST_SAMPLES as f64 {
+        return Ok(());
+    }
+    Err(Failure::input(format!(
+        "{name}: {}",
+        wav::too_long(rate_hz)
+    )))
 }
 
 /// The motion as a sound: at a constant rate, filled, filtered and without its mean.
@@ -283,16 +327,17 @@ fn sound(series: &Series, rate_hz: u32, how: &Restoration) -> Vec<f32> {
     sound
 }
 
-/// Lets `fill` write to a file or to standard output.
+/// Lets `fill` write to a file, which appears whole, or to standard output.
 fn write_to(
     place: Option<&Path>,
-    fill: impl FnOnce(&mut BufWriter<Box<dyn Write>>) -> io::Result<()>,
+    fill: impl FnOnce(&mut dyn Write) -> io::Result<()>,
 ) -> io::Result<()> {
-    let to: Box<dyn Write> = match place {
-        Some(path) => Box::new(File::create(path)?),
-        None => Box::new(io::stdout().lock()),
-    };
-    let mut to = BufWriter::with_capacity(1 << 16, to);
+    if let Some(path) = place {
+        let mut file = WholeFile::create(path)?;
+        fill(&mut file)?;
+        return file.finish();
+    }
+    let mut to = BufWriter::with_capacity(1 << 16, io::stdout().lock());
     fill(&mut to)?;
     to.flush()
 }

@@ -31,7 +31,7 @@ pub mod sweep;
 
 /// Measures vibration with a rolling-shutter camera: every row of a frame is a sample in time.
 #[derive(Debug, Parser)]
-#[command(name = "rowtone", version, disable_help_subcommand = true)]
+#[command(name = "rowtone", version)]
 #[command(after_help = "Without a command, `rowtone` runs `rowtone demo`.")]
 struct Cli {
     #[command(subcommand)]
@@ -117,6 +117,7 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
         Ok(cli) => cli,
         Err(error) => return answer(&error),
     };
+    crate::stop::outlive_large_files();
     let command = cli.command.unwrap_or(Command::Demo(demo::Args::default()));
     match run(&command) {
         Ok(()) => ExitCode::SUCCESS,

@@ -4,15 +4,16 @@ mod forms;
 mod modes;
 mod options;
 
-use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::Ordering;
 
 pub use options::Args;
 
 use crate::output::progress::Progress;
 use host_sim::{Camera, SimError, Truth, parallel, y4m};
 use rowtone_failure::Failure;
+use rowtone_files::WholeFile;
 
 /// Makes the recording.
 ///
@@ -29,7 +30,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         let mut out = create(path)?;
         write_to(
             path,
-            y4m::write_times(&mut out, camera.arriving()).and_then(|()| out.flush()),
+            y4m::write_times(&mut out, camera.arriving()).and_then(|()| out.finish()),
         )?;
     } else if is_irregular(&camera) {
         eprintln!("rowtone: the frames do not come evenly; add --pts FILE to keep their times");
@@ -38,14 +39,14 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         write_truth(path, &camera, times.as_deref())?;
     }
     if args.output == Path::new("-") {
-        write_clip(
-            BufWriter::new(io::stdout().lock()),
-            "standard output",
-            &camera,
-        )
+        let mut out = BufWriter::new(io::stdout().lock());
+        let name = "standard output";
+        write_clip(&mut out, name, &camera)?;
+        out.flush().map_err(|e| Failure::writing(name, &e))
     } else {
-        let name = args.output.display().to_string();
-        write_clip(create(&args.output)?, &name, &camera)
+        let mut out = create(&args.output)?;
+        write_clip(&mut out, &args.output.display().to_string(), &camera)?;
+        write_to(&args.output, out.finish())
     }
 }
 
@@ -77,27 +78,28 @@ fn write_truth(path: &Path, camera: &Camera, times: Option<&Path>) -> Result<(),
         path,
         written
             .and_then(|()| writeln!(out))
-            .and_then(|()| out.flush()),
+            .and_then(|()| out.finish()),
     )
 }
 
-fn write_clip(mut out: impl Write, name: &str, camera: &Camera) -> Result<(), Failure> {
+fn write_clip(out: &mut impl Write, name: &str, camera: &Camera) -> Result<(), Failure> {
     let failed = |e: io::Error| Failure::writing(name, &e);
     let progress = Progress::new(Some(camera.arriving().count() as u64));
-    y4m::write_header(&mut out, &camera.config().sensor).map_err(failed)?;
+    let stop = crate::stop::on_signals();
+    y4m::write_header(out, &camera.config().sensor).map_err(failed)?;
     parallel::for_each_frame(camera, parallel::all_threads(), |frame| {
+        if stop.load(Ordering::Relaxed) {
+            return Err(Failure::input(format!(
+                "{name}: interrupted: the clip is not complete"
+            )));
+        }
         progress.step();
-        y4m::write_frame(&mut out, &frame)
+        y4m::write_frame(out, &frame).map_err(failed)
     })
-    .map_err(failed)?;
-    out.flush().map_err(failed)
 }
 
-fn create(path: &Path) -> Result<BufWriter<File>, Failure> {
-    match File::create(path) {
-        Ok(file) => Ok(BufWriter::with_capacity(1 << 20, file)),
-        Err(e) => Err(Failure::writing(&path.display().to_string(), &e)),
-    }
+fn create(path: &Path) -> Result<WholeFile, Failure> {
+    WholeFile::create(path).map_err(|e| Failure::writing(&path.display().to_string(), &e))
 }
 
 fn write_to(path: &Path, result: io::Result<()>) -> Result<(), Failure> {

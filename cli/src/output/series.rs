@@ -138,6 +138,16 @@ impl Series {
         frames + f64::from(self.after_s.last().copied().unwrap_or(0.0))
     }
 
+    /// The longest time between two frames: where it begins and how long it is, s. `None` for fewer than two.
+    pub fn longest_gap(&self) -> Option<(f64, f64)> {
+        let gaps = self
+            .frames_ns
+            .windows(2)
+            .map(|pair| (pair[0], pair[1] - pair[0]));
+        let (at, gap) = gaps.max_by_key(|&(_, gap)| gap)?;
+        Some((at as f64 * 1e-9, gap as f64 * 1e-9))
+    }
+
     /// Subtracts each slot's mean over the recording, weighted by information.
     pub fn remove_means(&mut self) {
         for slot in 0..self.slots {
@@ -367,6 +377,12 @@ mod tests {
         series.push_frame(500_000_000, &[sample(0.0, 3.0), sample(0.25, 7.0)]);
         series.remove_means();
         series
+    }
+
+    #[test]
+    fn the_longest_gap_is_between_frames() {
+        assert_eq!(series().longest_gap(), Some((0.0, 0.5)));
+        assert_eq!(Series::new(0, 1, 1, Axes::X).longest_gap(), None);
     }
 
     #[test]

@@ -8,6 +8,15 @@ const HEADER: u32 = 58;
 /// Most samples that the format's 32-bit sizes can state.
 pub const MOST_SAMPLES: usize = ((u32::MAX - HEADER) / 4) as usize;
 
+/// What is said of more samples than that.
+pub fn too_long(rate_hz: u32) -> String {
+    format!(
+        "a WAV file holds at most 4 GiB, which is {:.1} hours at {rate_hz} samples a second: write CSV or NPY, \
+         or more rows a sample",
+        MOST_SAMPLES as f64 / f64::from(rate_hz) / 3600.0
+    )
+}
+
 /// Writes the file.
 ///
 /// # Errors
@@ -16,11 +25,7 @@ pub fn write(to: &mut impl Write, rate_hz: u32, samples: &[f32]) -> io::Result<(
     if samples.len() > MOST_SAMPLES {
         return Err(io::Error::new(
             io::ErrorKind::FileTooLarge,
-            format!(
-                "a WAV file holds at most 4 GiB, which is {:.1} hours at {rate_hz} samples a second: write CSV or NPY, \
-                 or more rows a sample",
-                MOST_SAMPLES as f64 / f64::from(rate_hz) / 3600.0
-            ),
+            too_long(rate_hz),
         ));
     }
     let bytes = 4 * samples.len() as u32;

@@ -75,7 +75,7 @@ pub fn write(path: &Path, drawing: &impl Drawing) -> Result<(), Failure> {
     };
     let bytes =
         bytes.map_err(|error| Failure::input(format!("{name}: cannot be drawn: {error}")))?;
-    std::fs::write(path, bytes).map_err(|error| Failure::writing(&name.to_string(), &error))
+    rowtone_files::write(path, bytes).map_err(|error| Failure::writing(&name.to_string(), &error))
 }
 
 /// Whether a picture of this name can be drawn.

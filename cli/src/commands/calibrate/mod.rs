@@ -11,6 +11,7 @@ use rowtone_calibrate::rows::{Collector, Recording};
 use rowtone_calibrate::{Light, calibrate_with_stripes, plot, vibration};
 use rowtone_clip::Rect;
 use rowtone_failure::Failure;
+use rowtone_files::WholeFile;
 
 /// Standard deviation of the mains frequency, relative: ±0.03 Hz of 50, what large grids keep.
 const MAINS_RELATIVE_SD: f64 = 6e-4;
@@ -106,10 +107,18 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             return Err(Failure::usage(format!("{name}: want a number above 0")));
         }
     }
+    if args.fps.is_some_and(|fps| !(1e-3..=1e7).contains(&fps)) {
+        return Err(Failure::usage(
+            "--fps: want a frame rate from 0.001 to 10000000 Hz",
+        ));
+    }
     if !(args.led_duty > 0.0 && args.led_duty < 1.0) {
         return Err(Failure::usage(
             "--led-duty: want a number between 0 and 1, such as 0.5".to_owned(),
         ));
+    }
+    for path in [&args.output, &args.plot].into_iter().flatten() {
+        WholeFile::check(path).map_err(|e| Failure::writing(&path.display().to_string(), &e))?;
     }
     let name = args.input.join(" ");
     let recording = if args.from_vibration {
@@ -199,5 +208,5 @@ fn light(args: &Args) -> Light {
 }
 
 fn write_file(path: &Path, text: &str) -> Result<(), Failure> {
-    std::fs::write(path, text).map_err(|e| Failure::writing(&path.display().to_string(), &e))
+    rowtone_files::write(path, text).map_err(|e| Failure::writing(&path.display().to_string(), &e))
 }

@@ -107,6 +107,7 @@ fn each_frame(
         ..CameraArgs::of(name)
     };
     let mut feed = Feed::open(&options)?;
+    feed.stop_when(crate::stop::on_signals());
     for note in &feed.notes {
         eprintln!("rowtone: {}: {note}", feed.name);
     }

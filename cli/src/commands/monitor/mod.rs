@@ -20,7 +20,7 @@ use rowtone_serial::port::PortName;
 #[derive(Debug, clap::Args)]
 #[command(after_help = "On a terminal: q, Esc or Ctrl-C leaves.\n\nExample:\n  \
     rowtone monitor /dev/ttyUSB0 --log vibration.csv\n  \
-    rowtone analyze clip.y4m --line-time-us 18.9 --format wire | rowtone monitor -")]
+    rowtone analyze clip.mp4 --line-time-us 18.9 --format wire \\\n      | rowtone monitor -")]
 pub struct Args {
     /// A serial port, with its speed if it is not 115200; a file, or `-` for standard input
     #[arg(value_name = "PORT[:BAUD]")]

@@ -12,10 +12,13 @@ use host_sim::{
 
 const EXAMPLES: &str = "\
 Examples:
-  rowtone simulate --preset ov5647 --tone 49.2:0.4 --tone 296.7:0.02 --seconds 2 -o clip.y4m --truth clip.json
-  rowtone simulate --scene photo --chirp 100:1000:10:0.5 --seconds 10 -o - | rowtone analyze - --line-time-us 40
+  rowtone simulate --preset ov5647 --tone 49.2:0.4 --tone 296.7:0.02 \\
+      --seconds 2 -o clip.y4m --truth clip.json
+  rowtone simulate --scene photo --chirp 100:1000:10:0.5 --seconds 10 \\
+      -o - | rowtone analyze - --line-time-us 40
   rowtone simulate --scene plain --led 1000 --blur-px 0 --frames 30 -o led.y4m
-  rowtone simulate --size 640x480 --calibration calibration.toml --tone 49.2:0.4 -o clip.y4m";
+  rowtone simulate --size 640x480 --calibration calibration.toml \\
+      --tone 49.2:0.4 -o clip.y4m";
 
 /// Options of `rowtone simulate`.
 #[derive(Clone, Debug, clap::Args)]
