@@ -5,6 +5,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use clap::ValueEnum;
 use rowtone::report::{MAX_PEAKS, PeakShape, Report, Warnings};
+use rowtone::tracker::Axes;
 use rowtone::wire::{Message, text as wire_text};
 
 use crate::output::Out;
@@ -15,8 +16,9 @@ use rowtone_files::WholeFile;
 use rowtone_measure::analysis::{Analysis, Event, Plan, Settings};
 use rowtone_measure::tracking::Shifts;
 use rowtone_plot::Picture;
+use rowtone_report::json::{self, Place};
+use rowtone_report::text;
 use rowtone_report::zone::ZoneLimits;
-use rowtone_report::{json, text};
 use rowtone_serial::port::PortName;
 use rowtone_serial::sender::Sender;
 
@@ -129,7 +131,17 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             one_a_frame: args.camera.global_shutter,
         })
     });
+    let part = shifts.part;
+    let (width, height) = shifts.camera.size;
+    let given = shifts.camera.turn.back().part(part, width, height);
     let mut outlets = Outlets {
+        place: Place {
+            roi: [given.x, given.y, given.width, given.height],
+            axes: match shifts.axes {
+                Axes::X => "x",
+                Axes::Xy => "xy",
+            },
+        },
         format: args.format,
         zone_limits: args.zone_limits,
         warnings: shifts.camera.warnings,
@@ -186,6 +198,7 @@ fn session() -> u32 {
 
 /// Where reports go.
 struct Outlets {
+    place: Place,
     format: Format,
     zone_limits: Option<ZoneLimits>,
     /// What the recording itself warns of.
@@ -241,7 +254,12 @@ impl Outlets {
         let out = &mut self.out;
         self.progress.aside(|| match self.format {
             Format::Text => out.line(&text::zoned(&brief, self.zone_limits.as_ref())),
-            Format::Json => out.line(&json::measured(report, shapes, self.zone_limits.as_ref())),
+            Format::Json => out.line(&json::measured(
+                report,
+                shapes,
+                self.place,
+                self.zone_limits.as_ref(),
+            )),
             Format::Wire => sentence.map_or(Ok(()), |s| out.line(s.trim_end_matches('\n'))),
         })
     }

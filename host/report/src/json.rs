@@ -15,6 +15,8 @@ struct ReportObject {
     lines: u32,
     lost_frames: u16,
     noise_px: f32,
+    #[serde(flatten)]
+    place: Option<Place>,
     #[serde(skip_serializing_if = "Option::is_none")]
     velocity_mm_s_rms: Option<f32>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -99,6 +101,15 @@ impl RowObject {
     }
 }
 
+/// What of the picture was measured.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Place {
+    /// The part: x, y, width and height in the picture as given, before it is turned.
+    pub roi: [usize; 4],
+    /// `x` or `xy`.
+    pub axes: &'static str,
+}
+
 #[derive(Serialize)]
 struct TimingObject {
     line_time_us_fit: Option<f32>,
@@ -137,21 +148,27 @@ pub fn zoned(report: &Report, limits: Option<&ZoneLimits>) -> String {
     to_string(report, &[], limits, None)
 }
 
-/// The same of a recording that was measured here: with the shapes of those peaks that are not rigid, and what the motion says
-/// of the time base.
-pub fn measured(report: &Report, shapes: &[PeakShape], limits: Option<&ZoneLimits>) -> String {
+/// The same of a recording that was measured here: with what of the picture was measured, the shapes of those peaks that are
+/// not rigid, and what the motion says of the time base.
+pub fn measured(
+    report: &Report,
+    shapes: &[PeakShape],
+    place: Place,
+    limits: Option<&ZoneLimits>,
+) -> String {
     let timing = TimingObject {
         line_time_us_fit: report.line_time_us_fit,
     };
-    to_string(report, shapes, limits, Some(timing))
+    to_string(report, shapes, limits, Some((place, timing)))
 }
 
 fn to_string(
     report: &Report,
     shapes: &[PeakShape],
     limits: Option<&ZoneLimits>,
-    timing: Option<TimingObject>,
+    here: Option<(Place, TimingObject)>,
 ) -> String {
+    let (place, timing) = here.unzip();
     let velocity = band_velocity(report);
     let object = ReportObject {
         seq: report.seq,
@@ -161,6 +178,7 @@ fn to_string(
         lines: report.lines,
         lost_frames: report.lost_frames,
         noise_px: report.noise_px,
+        place,
         velocity_mm_s_rms: velocity.map(|v| v as f32),
         zone: limits.zip(velocity).map(|(limits, v)| limits.zone(v)),
         peaks: report
@@ -177,6 +195,7 @@ fn to_string(
 
 #[cfg(test)]
 mod tests {
+    use super::Place;
     use crate::example;
     use rowtone::report::{Motion, PeakShape, ShapeRow};
 
@@ -218,7 +237,12 @@ mod tests {
             hz: report.peaks[0].hz,
             rows: [row].into_iter().collect(),
         };
-        let text = super::measured(&report, &[shape], None);
+        let place = Place {
+            roi: [4, 0, 120, 300],
+            axes: "x",
+        };
+        let text = super::measured(&report, &[shape], place, None);
+        assert!(text.contains(r#""noise_px":0.0131,"roi":[4,0,120,300],"axes":"x","peaks""#));
         assert!(
             text.contains(concat!(
                 r#""x_px":0.3998,"x_px_sd":0.0002,"y_px":null,"y_px_sd":null,"phase_rad":0.31,"#,
