@@ -3,7 +3,7 @@
 use rowtone::camera::Timing;
 use rowtone::pipeline::ReportSide;
 use rowtone::report::{PeakShape, Report, ShapeRow};
-use rowtone::spectrum::{Config, StaticStorage};
+use rowtone::spectrum::{Config, StaticCouplings, StaticStorage};
 use rowtone::timeline::{Curvature, Group, Sample, Spread, Vertical};
 
 struct Draw(u64);
@@ -105,8 +105,9 @@ fn nothing_panics_and_all_is_finite() {
         };
         // Every third knows both axes.
         let both = seed % 3 == 0;
+        let mut couplings = StaticCouplings::<48>::new();
         let lent = if both {
-            memory.lend_both()
+            memory.lend().with_couplings(&mut couplings)
         } else {
             memory.lend()
         };

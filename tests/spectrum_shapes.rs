@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use rowtone::camera::Timing;
 use rowtone::pipeline::ReportSide;
 use rowtone::report::{Peak, PeakShape, Report};
-use rowtone::spectrum::{Config, StaticStorage};
+use rowtone::spectrum::{Config, StaticCouplings, StaticStorage};
 use rowtone::timeline::{Group, Sample, Vertical, rows_per_sample};
 
 type Memory = StaticStorage<8192, 128, 128, 16384, 17>;
@@ -155,7 +155,9 @@ fn textured(seed: u64, lean: Option<f64>, motion: impl Fn(f64, f64) -> [f64; 2])
         })
         .collect();
     let mut memory = Box::new(Memory::new());
-    let mut analyzer = ReportSide::new(Config::default(), group, memory.lend_both()).unwrap();
+    let mut couplings = StaticCouplings::<128>::new();
+    let lent = memory.lend().with_couplings(&mut couplings);
+    let mut analyzer = ReportSide::new(Config::default(), group, lent).unwrap();
     for frame in 0..60_u32 {
         for (number, slot) in slots.iter().enumerate() {
             let number = number as u16;

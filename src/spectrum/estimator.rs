@@ -103,9 +103,10 @@ impl<'a> Estimator<'a> {
 
     fn slot_capacity(&self) -> usize {
         let s = &self.storage;
+        let channels = s.samples.channels(usize::from(self.group.slots()));
         s.slot_ns
             .len()
-            .min(s.slot_rows.len() / super::storage::SLOT_ROWS)
+            .min(s.slot_rows.len() / super::storage::slot_rows(channels))
             .min(s.slot_phasors.len() / 4)
     }
 
@@ -233,9 +234,10 @@ fn view<'s>(
     let (frame_t, frame_weight, scratch, row_t, own_re, own_im) =
         (row(), row(), row(), row(), row(), row());
     let (slot_t, rest) = storage.slot_rows.split_at_mut(slots);
-    let (series_weight, rest) = rest.split_at_mut(2 * slots);
+    let series = storage.samples.channels(slots) * slots;
     let (slot_eta, rest) = rest.split_at_mut(slots);
-    let (score_re, score_im) = rest.split_at_mut(2 * slots);
+    let (series_weight, rest) = rest.split_at_mut(series);
+    let (score_re, score_im) = rest.split_at_mut(series);
     let half = storage.frame_phasors.len() / 2;
     let (frame_re, frame_im) = storage.frame_phasors.split_at_mut(half);
     let half = storage.slot_phasors.len() / 2;

@@ -100,12 +100,13 @@ impl Loaded {
         let (frame_t, rest) = s.frame_rows.split_at_mut(frames);
         let frame_weight = &mut rest[..frames];
         let (slot_t, rest) = s.slot_rows.split_at_mut(slots);
-        let (slot_weight, rest) = rest.split_at_mut(2 * slots);
-        let slot_eta = &mut rest[..slots];
+        let (slot_eta, rest) = rest.split_at_mut(slots);
+        let two = s.samples.channels(slots) > 1;
+        let (slot_weight, rest) = rest.split_at_mut(slots);
+        let second_weight = &mut rest[..if two { slots } else { 0 }];
         frame_weight.fill(0.0);
         let unit = skew_unit_ns(group);
         let (mut late, mut total) = (0.0_f32, 0.0_f32);
-        let two = s.samples.channels(slots) > 1;
         for slot in 0..slots {
             let (mut sum, mut skew_sum, mut second) = (0.0, 0.0, 0.0);
             for i in 0..frames {
@@ -125,7 +126,10 @@ impl Loaded {
                     s.samples.skew[at] = 0;
                 }
             }
-            (slot_weight[slot], slot_weight[slots + slot]) = (sum - second, second);
+            slot_weight[slot] = sum - second;
+            if let Some(weight) = second_weight.get_mut(slot) {
+                *weight = second;
+            }
             let skew = if sum > 0.0 {
                 libm::roundf(skew_sum / sum) as i16
             } else {
@@ -145,7 +149,7 @@ impl Loaded {
             late += sum * s.slot_ns[slot] as f32;
             total += sum;
         }
-        let knows = |slot: usize| slot_weight[slot] + slot_weight[slots + slot];
+        let knows = |slot: usize| slot_weight[slot] + second_weight.get(slot).unwrap_or(&0.0);
         spread_over_rows(slot_eta, knows, total, group);
         let middle = if total > 0.0 {
             (late / total) as i64

@@ -57,7 +57,7 @@ pub use config::{Config, ConfigError};
 pub use estimator::Estimator;
 pub use follow::{Follower, name_harmonics};
 pub use plan::{FrameRatePlan, PlanError};
-pub use storage::{EstimatorStorage, StaticStorage, Storage};
+pub use storage::{EstimatorStorage, StaticCouplings, StaticStorage, Storage};
 pub use tones::Tones;
 pub use window::{FrameMark, SampleBuffer, SlotCoupling, WindowMark};
 

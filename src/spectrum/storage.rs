@@ -13,8 +13,11 @@ pub(crate) const MAX_GRID: usize = if cfg!(feature = "grid-32768") {
     8192
 };
 
-/// Rows of [`EstimatorStorage::slot_rows`]: time, two weights, place among the rows, and four of scratch.
-pub(crate) const SLOT_ROWS: usize = 8;
+/// Rows of [`EstimatorStorage::slot_rows`] for so many channels: time and place among the rows, and for each channel its
+/// weight and two of scratch.
+pub(crate) const fn slot_rows(channels: usize) -> usize {
+    2 + 3 * channels
+}
 
 /// What [`super::Estimator`] works in. F: frames a window, S: slots a frame.
 #[derive(Debug)]
@@ -27,7 +30,7 @@ pub struct EstimatorStorage<'a> {
     pub slot_ns: &'a mut [i64],
     /// 6·F.
     pub frame_rows: &'a mut [f32],
-    /// 8·S.
+    /// 5·S, and 8·S where samples know both axes.
     pub slot_rows: &'a mut [f32],
     /// Phasors of tones at frames: 2·F·(tones + 1).
     pub frame_phasors: &'a mut [f32],
@@ -71,12 +74,11 @@ pub struct StaticStorage<
     weight: [[u16; SAMPLES]; 2],
     skew: [[i16; SAMPLES]; 2],
     spread: [[Spread; SLOTS]; 2],
-    couplings: [[SlotCoupling; SLOTS]; 2],
     frames: [[FrameMark; FRAMES]; 2],
     frame_ns: [i64; FRAMES],
     slot_ns: [i64; SLOTS],
     frame_rows: [[f32; FRAMES]; FRAME_ROWS],
-    slot_rows: [[f32; SLOTS]; SLOT_ROWS],
+    slot_rows: [[f32; SLOTS]; slot_rows(1)],
     frame_phasors: [[[f32; FRAMES]; 2]; ROWS],
     slot_phasors: [[[f32; SLOTS]; 2]; ROWS],
     grid: [f32; GRID],
@@ -100,11 +102,6 @@ impl<
                 variance_ns2: 0.0,
                 third_ns3: 0.0,
             }; SLOTS]; 2],
-            couplings: [[SlotCoupling {
-                coupling: 0.0,
-                coupling_delay_ns: 0.0,
-                delay_ns: 0.0,
-            }; SLOTS]; 2],
             frames: [[FrameMark {
                 number: 0,
                 start_ns: 0,
@@ -113,29 +110,19 @@ impl<
             frame_ns: [0; FRAMES],
             slot_ns: [0; SLOTS],
             frame_rows: [[0.0; FRAMES]; FRAME_ROWS],
-            slot_rows: [[0.0; SLOTS]; SLOT_ROWS],
+            slot_rows: [[0.0; SLOTS]; slot_rows(1)],
             frame_phasors: [[[0.0; FRAMES]; 2]; ROWS],
             slot_phasors: [[[0.0; SLOTS]; 2]; ROWS],
             grid: [0.0; GRID],
         }
     }
 
-    /// Lends all of it, for samples that know the motion along x alone.
+    /// Lends all of it, for samples that know the motion along x alone. For both axes see [`Storage::with_couplings`].
     pub const fn lend(&mut self) -> Storage<'_> {
-        let mut storage = self.lend_both();
-        storage.collected.couplings = &mut [];
-        storage.estimator.samples.couplings = &mut [];
-        storage
-    }
-
-    /// Lends all of it, for samples that know the motion along both axes: each takes two of the shifts, so that there is
-    /// room for half as many frames.
-    pub const fn lend_both(&mut self) -> Storage<'_> {
         let [shift_a, shift_b] = &mut self.shift_px;
         let [weight_a, weight_b] = &mut self.weight;
         let [skew_a, skew_b] = &mut self.skew;
         let [spread_a, spread_b] = &mut self.spread;
-        let [couplings_a, couplings_b] = &mut self.couplings;
         let [frames_a, frames_b] = &mut self.frames;
         Storage {
             collected: SampleBuffer {
@@ -143,7 +130,7 @@ impl<
                 weight: weight_a,
                 skew: skew_a,
                 spread: spread_a,
-                couplings: couplings_a,
+                couplings: &mut [],
                 frames: frames_a,
             },
             estimator: EstimatorStorage {
@@ -152,7 +139,7 @@ impl<
                     weight: weight_b,
                     skew: skew_b,
                     spread: spread_b,
-                    couplings: couplings_b,
+                    couplings: &mut [],
                     frames: frames_b,
                 },
                 frame_ns: &mut self.frame_ns,
@@ -177,5 +164,53 @@ impl<
 {
     fn default() -> Self {
         Self::new()
+    }
+}
+
+/// What a [`StaticStorage`] needs besides for samples that know the motion along both axes.
+///
+/// ```
+/// use rowtone::spectrum::{StaticCouplings, StaticStorage};
+/// let mut storage = Box::new(StaticStorage::<4096, 96, 48, 8192, 9>::new());
+/// let mut couplings = StaticCouplings::<48>::new();
+/// assert!(core::mem::size_of_val(&couplings) < 3 * 1024);
+/// let storage = storage.lend().with_couplings(&mut couplings);
+/// assert_eq!(storage.collected.couplings.len(), 48);
+/// ```
+#[derive(Clone, Debug)]
+pub struct StaticCouplings<const SLOTS: usize> {
+    couplings: [[SlotCoupling; SLOTS]; 2],
+    slot_rows: [[f32; SLOTS]; slot_rows(2)],
+}
+
+impl<const SLOTS: usize> StaticCouplings<SLOTS> {
+    /// Empty memory.
+    pub const fn new() -> Self {
+        Self {
+            couplings: [[SlotCoupling::NONE; SLOTS]; 2],
+            slot_rows: [[0.0; SLOTS]; slot_rows(2)],
+        }
+    }
+}
+
+impl<const SLOTS: usize> Default for StaticCouplings<SLOTS> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<'a> Storage<'a> {
+    /// The same for samples that know the motion along both axes: each takes two of the shifts, so that there is room for
+    /// half as many frames.
+    #[must_use]
+    pub fn with_couplings<const SLOTS: usize>(
+        mut self,
+        couplings: &'a mut StaticCouplings<SLOTS>,
+    ) -> Self {
+        let [collected, computed] = &mut couplings.couplings;
+        self.collected.couplings = collected;
+        self.estimator.samples.couplings = computed;
+        self.estimator.slot_rows = couplings.slot_rows.as_flattened_mut();
+        self
     }
 }

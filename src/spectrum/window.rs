@@ -39,6 +39,13 @@ pub struct SlotCoupling {
 }
 
 impl SlotCoupling {
+    /// Nothing of the one in the other.
+    pub(crate) const NONE: Self = Self {
+        coupling: 0.0,
+        coupling_delay_ns: 0.0,
+        delay_ns: 0.0,
+    };
+
     /// That of one sample; what is no number is 0.
     fn of(vertical: &Vertical) -> Self {
         let known = |v: f32| if v.abs() < MOST_COUPLING { v } else { 0.0 };

@@ -114,7 +114,7 @@ impl SpectrumMemory {
             frame_ns: vec![0; frames],
             slot_ns: vec![0; slots],
             frame_rows: vec![0.0; 6 * frames],
-            slot_rows: vec![0.0; 8 * slots],
+            slot_rows: vec![0.0; 5 * slots],
             frame_phasors: vec![0.0; 2 * rows * frames],
             slot_phasors: vec![0.0; 2 * rows * slots],
             grid: vec![0.0; GRID],
