@@ -4,7 +4,6 @@ use core::fmt;
 
 use crate::report::MAX_PEAKS;
 
-use super::real::Real;
 use super::{Region, Settings, Wire};
 
 /// What the board's camera and memory allow.
@@ -66,37 +65,26 @@ impl fmt::Display for SettingsError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Window { window_s, max_s } => {
-                let (window_s, max_s) = (Real(*window_s), Real(*max_s));
                 write!(f, "window is {window_s} s; give 0.05 to {max_s}")
             }
             Self::Hop { hop_s, window_s } => write!(
                 f,
                 "hop is {} s; give 0.01 to the window's length, {}",
-                Real(*hop_s),
-                Real(*window_s)
+                hop_s, window_s
             ),
             Self::MaxPeaks(n) => write!(f, "max-peaks is {n}; give 1 to {MAX_PEAKS}"),
-            Self::FalseAlarm(p) => write!(f, "false-alarm is {}; give 1e-9 to 0.5", Real(*p)),
-            Self::Scale(s) => write!(
-                f,
-                "um-per-px is {}; give 0.001 to 100000, or none",
-                Real(*s)
-            ),
+            Self::FalseAlarm(p) => write!(f, "false-alarm is {}; give 1e-9 to 0.5", p),
+            Self::Scale(s) => write!(f, "um-per-px is {}; give 0.001 to 100000, or none", s),
             Self::Roi(r, limits) => write!(
                 f,
                 "roi is {},{},{},{}; keep it inside {}x{} px, at least {} wide and 1 high",
                 r.x, r.y, r.width, r.height, limits.width, limits.height, limits.min_width
             ),
-            Self::Frequency(hz) => write!(
-                f,
-                "frequency is {} Hz; give 0 to 1000000, or none",
-                Real(*hz)
-            ),
+            Self::Frequency(hz) => write!(f, "frequency is {} Hz; give 0 to 1000000, or none", hz),
             Self::Band { min_hz, max_hz } => write!(
                 f,
                 "min-hz is {}, max-hz is {}; keep min-hz below max-hz",
-                Real(*min_hz),
-                Real(*max_hz)
+                min_hz, max_hz
             ),
             Self::Wire(Wire::Text | Wire::Binary) => {
                 f.write_str("wire is binary; this firmware was built without it")

@@ -165,7 +165,7 @@ pub fn parse<'a>(line: &'a str) -> Result<Command<'a>, CommandError<'a>> {
         "set" if rest.is_empty() => return Err(CommandError::Missing("a setting and its value")),
         "set" => return Ok(Command::Set(Changes(rest))),
         "resend" => {
-            let number = |text: &'a str| whole(text.as_bytes()).ok_or(CommandError::Number(text));
+            let number = |text: &'a str| whole(text).ok_or(CommandError::Number(text));
             let missing = CommandError::Missing("the number of a report");
             let from = number(words.next().ok_or(missing)?)?;
             let to = words.next().map_or(Ok(from), number)?;

@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-use super::real::{self, Real};
+use super::real;
 use super::{Region, Settings, Wire};
 
 /// Name of a setting; the same names as the options of the command `rowtone`.
@@ -96,7 +96,7 @@ impl Key {
         let wrong = ValueError(self);
         let number = |text: &str| real::parse(text).ok_or(wrong);
         let byte = |text: &str| {
-            let whole = real::whole(text.as_bytes()).and_then(|n| u8::try_from(n).ok());
+            let whole = real::whole(text).and_then(|n| u8::try_from(n).ok());
             whole.ok_or(wrong)
         };
         let optional = |text: &str| match text {
@@ -137,14 +137,14 @@ impl Key {
     pub fn write(self, settings: &Settings, out: &mut impl fmt::Write) -> fmt::Result {
         write!(out, "{}=", self.name())?;
         let optional = |out: &mut dyn fmt::Write, value: Option<f32>| match value {
-            Some(value) => write!(out, "{}", Real(value)),
+            Some(value) => write!(out, "{value}"),
             None => out.write_str("none"),
         };
         match self {
-            Self::Window => write!(out, "{}", Real(settings.window_s)),
-            Self::Hop => write!(out, "{}", Real(settings.hop_s)),
+            Self::Window => write!(out, "{}", settings.window_s),
+            Self::Hop => write!(out, "{}", settings.hop_s),
             Self::MaxPeaks => write!(out, "{}", settings.max_peaks),
-            Self::FalseAlarm => write!(out, "{}", Real(settings.false_alarm)),
+            Self::FalseAlarm => write!(out, "{}", settings.false_alarm),
             Self::UmPerPx => optional(out, settings.um_per_px),
             Self::Roi => match settings.roi {
                 Some(r) => write!(out, "{},{},{},{}", r.x, r.y, r.width, r.height),
@@ -163,7 +163,7 @@ impl Key {
 }
 
 fn parse_region(text: &str) -> Option<Region> {
-    let mut parts = text.as_bytes().split(|&byte| byte == b',');
+    let mut parts = text.split(',');
     let mut next = || u16::try_from(real::whole(parts.next()?)?).ok();
     let region = Region {
         x: next()?,

@@ -1,144 +1,17 @@
-//! Numbers as people type and read them: `0.25`, `12`, `1e-3`.
-//!
-//! The standard library's conversions are exact for every number there is, and take 27 KiB of a
-//! microcontroller's flash for it. These are right to the last bit for up to seven digits and ten
-//! decimals, which is what settings have, and to a few bits beyond.
+//! Numbers as people type them: `0.25`, `12`, `1e-3`, by the standard library's exact conversions.
 
-use core::fmt;
-
-/// Powers of ten that an `f32` holds exactly.
-const POWERS: [f32; 11] = [1.0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10];
-
-/// Largest power that is multiplied by: twice it leaves the range of an `f32`.
-const MOST_POWER: i32 = 40;
-
-/// `value · 10^power`.
-fn scaled(mut value: f32, power: i32) -> f32 {
-    let mut left = power.unsigned_abs().min(MOST_POWER.unsigned_abs()) as usize;
-    while left > 0 {
-        let step = left.min(POWERS.len() - 1);
-        let factor = POWERS.get(step).copied().unwrap_or(1.0);
-        if power > 0 {
-            value *= factor;
-        } else {
-            value /= factor;
-        }
-        left -= step;
-    }
-    value
-}
-
-/// Whether a minus stands in front, and what stands behind the sign.
-fn signed(text: &[u8]) -> (bool, &[u8]) {
-    match text {
-        [b'-', rest @ ..] => (true, rest),
-        [b'+', rest @ ..] => (false, rest),
-        _ => (false, text),
-    }
-}
-
-/// One or more digits.
-fn digits(text: &[u8]) -> Option<u32> {
-    if text.is_empty() {
-        return None;
-    }
-    text.iter().try_fold(0_u32, |number, &byte| {
-        let digit = byte.is_ascii_digit().then(|| u32::from(byte - b'0'))?;
-        number.checked_mul(10)?.checked_add(digit)
-    })
-}
-
-/// Reads a whole number from 0 to 2³² − 1, a plus in front of it or not; anything else is `None`. One such
-/// function for all: the standard library's has a copy for each type.
-pub(super) fn whole(text: &[u8]) -> Option<u32> {
-    match signed(text) {
-        (true, _) => None,
-        (false, text) => digits(text),
-    }
+/// Reads a whole number from 0 to 2³² − 1, a plus in front of it or not; anything else is `None`.
+pub(super) fn whole(text: &str) -> Option<u32> {
+    text.parse().ok()
 }
 
 /// Reads an optional sign, digits with at most one point among them, and an optional exponent.
 /// Anything else, and what is beyond an `f32`, is `None`.
 pub(super) fn parse(text: &str) -> Option<f32> {
-    let (negative, mut rest) = signed(text.as_bytes());
-    let (mut mantissa, mut power) = (0_u32, 0_i32);
-    let (mut is_number, mut is_part) = (false, false);
-    while let [byte, behind @ ..] = rest {
-        rest = behind;
-        match byte {
-            b'0'..=b'9' => {
-                // Beyond nine digits they only count for the power.
-                let taken = mantissa < 100_000_000;
-                if taken {
-                    mantissa = mantissa * 10 + u32::from(byte - b'0');
-                }
-                power = power.saturating_add(i32::from(!taken) - i32::from(is_part));
-                is_number = true;
-            }
-            b'.' if !is_part => is_part = true,
-            b'e' | b'E' => {
-                let (down, exponent) = signed(rest);
-                let exponent = i32::from(i8::try_from(digits(exponent)?).ok()?);
-                power = power.saturating_add(if down { -exponent } else { exponent });
-                break;
-            }
-            _ => return None,
-        }
-    }
-    let value = scaled(mantissa as f32, power);
-    let value = if negative { -value } else { value };
-    (is_number && value.is_finite()).then_some(value)
-}
-
-/// Writes a number in as few digits as tell it from its neighbours, never with an exponent.
-pub(super) struct Real(pub(super) f32);
-
-impl fmt::Display for Real {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let value = self.0.abs();
-        if value == 0.0 || !value.is_finite() {
-            return f.write_str(match value {
-                0.0 => "0",
-                v if v.is_nan() => "NaN",
-                _ => "inf",
-            });
-        }
-        if self.0 < 0.0 {
-            f.write_str("-")?;
-        }
-        // 10^magnitude ≤ value < 10^(magnitude + 1), or nearly.
-        let mut magnitude = 0;
-        while scaled(value, -magnitude) >= 10.0 {
-            magnitude += 1;
-        }
-        while scaled(value, -magnitude) < 1.0 && magnitude > -MOST_POWER {
-            magnitude -= 1;
-        }
-        let (mut mantissa, mut decimals) = (0, 0);
-        for digits in 0..9 {
-            decimals = digits - magnitude;
-            mantissa = libm::roundf(scaled(value, decimals)) as u32;
-            if scaled(mantissa as f32, -decimals) == value {
-                break;
-            }
-        }
-        write_decimal(f, mantissa, decimals)
-    }
-}
-
-/// `mantissa / 10^decimals`.
-fn write_decimal(f: &mut fmt::Formatter<'_>, mantissa: u32, decimals: i32) -> fmt::Result {
-    let decimals = decimals.clamp(-MOST_POWER, MOST_POWER + 9);
-    if decimals <= 0 {
-        write!(f, "{mantissa}")?;
-        return (decimals..0).try_for_each(|_| f.write_str("0"));
-    }
-    let places = decimals.unsigned_abs();
-    let (whole, part) = match 10_u32.checked_pow(places) {
-        Some(one) => (mantissa / one, mantissa % one),
-        None => (0, mantissa),
-    };
-    write!(f, "{whole}.{part:0width$}", width = places as usize)
+    // The standard library also takes `inf` and `nan`, which are no settings.
+    let is_number = |b: u8| b.is_ascii_digit() || matches!(b, b'.' | b'+' | b'-' | b'e' | b'E');
+    let value: f32 = text.parse().ok()?;
+    (value.is_finite() && text.bytes().all(is_number)).then_some(value)
 }
 
 #[cfg(test)]
@@ -149,8 +22,9 @@ mod tests {
     use proptest::prelude::*;
     use std::{format, string::String, string::ToString};
 
+    /// As settings are said.
     fn said(value: f32) -> String {
-        Real(value).to_string()
+        value.to_string()
     }
 
     #[test]
@@ -202,7 +76,7 @@ mod tests {
             "0x1",
         ] {
             let expected = text.parse::<u32>().ok().filter(|_| !text.starts_with('-'));
-            assert_eq!(whole(text.as_bytes()), expected, "{text}");
+            assert_eq!(whole(text), expected, "{text}");
         }
     }
 
