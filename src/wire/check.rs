@@ -4,17 +4,10 @@ use crate::report::Report;
 
 use super::message::Message;
 
-/// A microcontroller that speaks text alone says a few hundred bytes a second: bit by bit saves the table's
-/// 1 KiB of flash.
-#[cfg(all(target_os = "none", not(feature = "binary")))]
-type Steps = crc::NoTable;
-#[cfg(not(all(target_os = "none", not(feature = "binary"))))]
-type Steps = crc::Table<1>;
-
 /// CRC-32/ISO-HDLC, the checksum of every wire and of saved settings.
-pub(crate) static CRC_32: crc::Crc<u32, Steps> = crc::Crc::<u32, Steps>::new(&crc::CRC_32_ISO_HDLC);
+pub(crate) static CRC_32: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
 /// A sum under way.
-pub(crate) type Digest = crc::Digest<'static, u32, Steps>;
+pub(crate) type Digest = crc::Digest<'static, u32>;
 
 /// Every real number on a wire is smaller than this in size.
 pub const MAX_VALUE: f32 = 1e7;
