@@ -1,7 +1,7 @@
 //! The small positive definite system of the joint fit, solved in place.
 
 /// Largest system, unknowns: sixteen rigid tones and the shapes of a few, more where memory is cheap.
-pub(crate) const MOST: usize = if cfg!(feature = "grid-32768") {
+pub(crate) const MOST: usize = if cfg!(feature = "many-unknowns") {
     160
 } else {
     64

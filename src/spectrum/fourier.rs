@@ -1,22 +1,10 @@
-//! The energies of an even grid's frequencies, in place.
-//!
-//! With the feature `grid-32768` the transform is microfft's, a function a size with a common table: on a desktop a
-//! window takes a fifth less time so. Without it one loop serves all sizes, without a table, and a microcontroller's
-//! flash is 14 KiB smaller: real points are taken in pairs as complex numbers, transformed by halves (radix 2,
-//! decimation in time; Cooley and Tukey 1965) and untangled.
+//! The energies of an even grid's frequencies, in place: microfft's transforms, a function a size with
+//! a common table.
 
-#[cfg(any(test, not(feature = "grid-32768")))]
-mod compact;
-#[cfg(feature = "grid-32768")]
-mod unrolled;
-
-#[cfg(not(feature = "grid-32768"))]
-use compact::transform;
-#[cfg(feature = "grid-32768")]
-use unrolled::transform;
+use microfft::real;
 
 /// |Σ x\[t\]·e^(-2πi·kt/n)|² for k = 0 to n/2 - 1 of n = `points.len()` points: a power of two from 64 to
-/// 32 768 (8192 without the feature `grid-32768`). `None` for other lengths.
+/// 32 768. `None` for other lengths.
 pub(crate) fn energies(points: &mut [f32]) -> Option<&[f32]> {
     transform(points)?;
     let bins = points.len() / 2;
@@ -31,13 +19,34 @@ pub(crate) fn energies(points: &mut [f32]) -> Option<&[f32]> {
     points.get(..bins)
 }
 
+/// From n points, a power of two from 64 to 32 768, to real and imaginary part of bins 0 to n/2 - 1. `None` for other
+/// lengths.
+fn transform(points: &mut [f32]) -> Option<()> {
+    macro_rules! by_size {
+        ($($size:literal => $fft:ident),*) => {
+            match points.len() {
+                $($size => {
+                    let points: &mut [f32; $size] = points.try_into().ok()?;
+                    let bins = real::$fft(points);
+                    // There the highest frequency's is kept.
+                    bins[0].im = 0.0;
+                })*
+                _ => return None,
+            }
+        };
+    }
+    by_size!(
+        64 => rfft_64, 128 => rfft_128, 256 => rfft_256, 512 => rfft_512, 1024 => rfft_1024,
+        2048 => rfft_2048, 4096 => rfft_4096, 8192 => rfft_8192, 16384 => rfft_16384, 32768 => rfft_32768
+    );
+    Some(())
+}
+
 #[cfg(test)]
 mod tests {
     extern crate std;
-    use super::{compact, energies, transform};
+    use super::{energies, transform};
     use std::vec::Vec;
-
-    type Transform = fn(&mut [f32]) -> Option<()>;
 
     #[test]
     fn all_bins_are_those_of_the_sum_that_defines_them() {
@@ -46,19 +55,17 @@ mod tests {
                 .map(|t| ((t * t * 7 + 3 * t) % 101) as f32 / 50.0 - 1.0 + 0.3 * (t % 2) as f32)
                 .collect();
             let size = points.iter().map(|&x| f64::from(x * x)).sum::<f64>().sqrt();
-            for transform in [transform as Transform, compact::transform] {
-                let mut work = points.clone();
-                transform(&mut work).unwrap();
-                for (k, bin) in work.chunks_exact(2).enumerate() {
-                    let (mut re, mut im) = (0.0, 0.0);
-                    for (t, &x) in points.iter().enumerate() {
-                        let angle = std::f64::consts::TAU * (k * t % n) as f64 / n as f64;
-                        re += f64::from(x) * angle.cos();
-                        im -= f64::from(x) * angle.sin();
-                    }
-                    let error = (f64::from(bin[0]) - re).hypot(f64::from(bin[1]) - im);
-                    assert!(error < 2e-6 * size, "bin {k} of {n} points: {error}");
+            let mut work = points.clone();
+            transform(&mut work).unwrap();
+            for (k, bin) in work.chunks_exact(2).enumerate() {
+                let (mut re, mut im) = (0.0, 0.0);
+                for (t, &x) in points.iter().enumerate() {
+                    let angle = std::f64::consts::TAU * (k * t % n) as f64 / n as f64;
+                    re += f64::from(x) * angle.cos();
+                    im -= f64::from(x) * angle.sin();
                 }
+                let error = (f64::from(bin[0]) - re).hypot(f64::from(bin[1]) - im);
+                assert!(error < 2e-6 * size, "bin {k} of {n} points: {error}");
             }
         }
     }
@@ -82,7 +89,6 @@ mod tests {
     fn other_lengths_are_refused() {
         for n in [0, 1, 2, 3, 6, 100, 65_536] {
             assert!(transform(&mut std::vec![1.0; n]).is_none(), "{n}");
-            assert!(compact::transform(&mut std::vec![1.0; n]).is_none(), "{n}");
         }
     }
 }

@@ -7,11 +7,7 @@ use crate::timeline::{Spread, Tally};
 pub(crate) const FRAME_ROWS: usize = 6;
 
 /// Most points of [`EstimatorStorage::grid`] that are used.
-pub(crate) const MAX_GRID: usize = if cfg!(feature = "grid-32768") {
-    32_768
-} else {
-    8192
-};
+pub(crate) const MAX_GRID: usize = 32_768;
 
 /// Rows of [`EstimatorStorage::slot_rows`] for so many channels: time and place among the rows, and for each channel its
 /// weight and two of scratch.
@@ -36,8 +32,7 @@ pub struct EstimatorStorage<'a> {
     pub frame_phasors: &'a mut [f32],
     /// Phasors of tones at slots: 2·S·(tones + 1).
     pub slot_phasors: &'a mut [f32],
-    /// The transform's grid: 64 to 32 768 points (8192 without the feature `grid-32768`), the largest power of two
-    /// that fits is used.
+    /// The transform's grid: 64 to 32 768 points, the largest power of two that fits is used.
     pub grid: &'a mut [f32],
 }
 
