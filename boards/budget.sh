@@ -9,8 +9,9 @@ set -euo pipefail
 name=${1:?usage: boards/budget.sh NAME ELF}
 elf=${2:?usage: boards/budget.sh NAME ELF}
 [ -f "$elf" ] || { echo "budget.sh: $elf is not there" >&2; exit 1; }
-max_flash=$((128 * 1024))
-max_ram=$((400 * 1024))
+# The RP2350 has 4 MiB of flash and 520 KiB of RAM.
+max_flash=$((512 * 1024))
+max_ram=$((500 * 1024))
 
 size=$(command -v llvm-size || command -v rust-size || command -v size)
 nm=$(command -v llvm-nm || command -v rust-nm || command -v nm)
