@@ -10,6 +10,7 @@ use rowtone::spectrum;
 use rowtone::timeline::{BinnerError, Group};
 use rowtone::tracker::{self, StaticStorage};
 use rowtone::wire::{Message, text};
+use rowtone_board::memory::{SpectrumMemory, rows_per_sample};
 use rowtone_mps2_an505::args::Args;
 use rowtone_mps2_an505::board::{
     counter::{Counter, Start},
@@ -18,7 +19,6 @@ use rowtone_mps2_an505::board::{
     uart::Uart,
 };
 use rowtone_mps2_an505::figures::Count;
-use rowtone_pico2::memory::{SpectrumMemory, rows_per_sample};
 use static_cell::{ConstStaticCell, StaticCell};
 
 /// The RP2350 has room for a picture of 320 x 240; a narrower one may have more rows here.
@@ -55,11 +55,11 @@ fn run(args: &Args, uart: &mut Uart) -> Result<(), Failure> {
     let mut tracking = tracker::Config::new(timing, clip.width);
     // Rounds end when this program says so.
     tracking.learn_frames = u16::MAX;
-    tracking.columns_per_line = rowtone_pico2::memory::COLUMNS_PER_LINE;
+    tracking.columns_per_line = rowtone_board::memory::COLUMNS_PER_LINE;
     let config = spectrum::Config {
         window_ns,
         hop_ns: window_ns / 2,
-        max_passes: rowtone_pico2::memory::MAX_PASSES,
+        max_passes: rowtone_board::memory::MAX_PASSES,
         ..spectrum::Config::default()
     };
     let mut board = Board {

@@ -15,5 +15,4 @@ pub mod health;
 pub mod hm01b0;
 pub mod led;
 pub mod losses;
-pub mod memory;
 pub mod plan;

@@ -11,9 +11,10 @@ use rowtone::camera::Timing;
 use rowtone::pipeline::{Collector, Reading, Reporter};
 use rowtone::report::Report;
 use rowtone::timeline::Group;
+use rowtone_board::memory::SpectrumMemory;
+use rowtone_board::plan::spectrum_config;
 use rowtone_pico2::handover::count;
-use rowtone_pico2::memory::SpectrumMemory;
-use rowtone_pico2::plan::{DEFAULTS, ROWS, spectrum_config};
+use rowtone_pico2::plan::{DEFAULTS, ROWS};
 use static_cell::StaticCell;
 
 /// Readings on their way: core 1's interrupt takes them at once, unless it is sending or copying a window.

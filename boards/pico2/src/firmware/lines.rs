@@ -5,12 +5,11 @@ use super::shared::{
 };
 use super::{Picture, compute};
 use core::sync::atomic::Ordering;
-use rowtone::camera::{Line, Pixels};
-use rowtone::link::settings::Region;
 use rowtone::pipeline::{LineSide, Reading};
 use rowtone::tracker::Stage;
+use rowtone_board::plan::Plan;
 use rowtone_pico2::handover::{LineBuffer, Taker, count};
-use rowtone_pico2::plan::Plan;
+use rowtone_pico2::plan;
 
 /// Plans, learns and measures, until a new plan is due; for ever.
 #[embassy_executor::task]
@@ -21,12 +20,12 @@ pub(crate) async fn work(mut taker: Taker<'static, M>, picture: &'static mut Pic
     loop {
         MEASURING.store(false, Ordering::Relaxed);
         PLAN_ANEW.store(false, Ordering::Relaxed);
-        let plan = plan(&mut taker).await;
+        let plan = await_plan(&mut taker).await;
         let Ok(mut lines) = LineSide::new(plan.tracker(), plan.group, picture.lend()) else {
             defmt::error!("the tracker refuses the plan");
             continue;
         };
-        defmt::info!("measuring lines of {} ps", plan.timing.line_time_ps());
+        defmt::info!("measuring lines of {} ps", plan.cut.timing.line_time_ps());
         PLAN.signal(plan);
         while !PLAN_ANEW.load(Ordering::Relaxed) {
             if let Some(reading) = taker.work(|line| measure(line, &plan, &mut lines)).await {
@@ -45,7 +44,7 @@ pub(crate) async fn work(mut taker: Taker<'static, M>, picture: &'static mut Pic
 }
 
 /// Waits until the camera's rhythm is known and the settings are there.
-async fn plan(taker: &mut Taker<'static, M>) -> Plan {
+async fn await_plan(taker: &mut Taker<'static, M>) -> Plan {
     loop {
         taker.work(|_| ()).await;
         let Some(settings) = SETTINGS.lock(|s| *s.borrow()) else {
@@ -56,7 +55,7 @@ async fn plan(taker: &mut Taker<'static, M>) -> Plan {
             let clock = frames.clock();
             clock
                 .is_settled()
-                .then(|| Plan::new(&settings, &CAMERA, clock))
+                .then(|| plan::plan(&settings, &CAMERA, clock))
                 .flatten()
         });
         if let Some(plan) = plan {
@@ -66,31 +65,13 @@ async fn plan(taker: &mut Taker<'static, M>) -> Plan {
 }
 
 fn measure(buffer: &LineBuffer, plan: &Plan, lines: &mut LineSide<'_>) -> Option<Reading> {
-    let Region {
-        x,
-        y,
-        width,
-        height,
-    } = plan.roi;
-    let row = buffer
-        .place
-        .row
-        .checked_sub(y)
-        .filter(|&row| row < height)?;
     let Ok(pixels) = buffer.pixels() else {
         count(&LINE_LOSSES.short);
         return None;
     };
-    let pixels = pixels.get(usize::from(x)..)?.get(..usize::from(width))?;
-    let start_ns = buffer
-        .place
-        .frame_start_ns
-        .saturating_add(plan.timing.start_ns(row));
-    let line = Line {
-        frame: buffer.place.frame,
-        row,
-        start_ns,
-        pixels: Pixels::U8(pixels),
-    };
+    let place = buffer.place;
+    let line = plan
+        .cut
+        .line(place.frame, place.frame_start_ns, place.row, pixels)?;
     lines.push(&line)
 }

@@ -5,12 +5,12 @@ use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use embassy_sync::blocking_mutex::{Mutex, raw::CriticalSectionRawMutex};
 use embassy_sync::signal::Signal;
 use rowtone::link::settings::Settings;
+use rowtone_board::plan::Plan;
 use rowtone_pico2::frames::Frames;
 use rowtone_pico2::handover::LineLosses;
 use rowtone_pico2::health::State;
 use rowtone_pico2::hm01b0::{Config, ROWS};
 use rowtone_pico2::losses::Losses;
-use rowtone_pico2::plan::Plan;
 
 /// Works across cores: embassy-rp's critical section takes a hardware spinlock.
 pub(crate) type M = CriticalSectionRawMutex;

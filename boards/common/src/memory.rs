@@ -1,4 +1,4 @@
-//! The core's memory, as statics of the sizes that fit the RP2350, and what follows from the sizes.
+//! The core's memory, as statics of sizes that fit half a megabyte of RAM, and what follows from the sizes.
 //!
 //! Everything starts as zeros, so it lies in `.bss` and costs no flash.
 
@@ -26,7 +26,6 @@ pub type SpectrumMemory = StaticStorage<SAMPLES, FRAMES, SLOTS, 8192, 10>;
 /// Rows that make a sample, so that a window of `frames` frames fits [`SpectrumMemory`].
 pub fn rows_per_sample(timing: Timing, frames: u32) -> u16 {
     let rows = timeline::rows_per_sample(timing, MAX_HZ, frames, SAMPLES);
-
     rows.max(timing.rows().div_ceil(SLOTS as u16))
 }
 
