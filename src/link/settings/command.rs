@@ -186,7 +186,7 @@ pub fn parse<'a>(line: &'a str) -> Result<Command<'a>, CommandError<'a>> {
 
 /// The number of a lock.
 fn code(text: &str) -> Result<u32, CommandError<'_>> {
-    let number = whole(text.as_bytes()).filter(|&number| number != 0);
+    let number = whole(text).filter(|&number| number != 0);
     number.ok_or(CommandError::Code(text))
 }
 
