@@ -88,23 +88,42 @@ impl Search {
         let length_s = samples.length_s;
         let (away, chirp) = residual.ramp(samples, model, (steady.frequency, axis));
         let start = steady.frequency.plus(away / length_s);
+        let struck = residual.struck(samples, model, (steady.frequency, axis));
+        let changing = |at| Tone {
+            modulated: true,
+            ..Tone::steady(at, axis)
+        };
+        let hit = struck.map(|struck| Tone {
+            growth: struck.growth,
+            onset: Some(struck.onset),
+            ..changing(steady.frequency)
+        });
+        let starts = [
+            Some(changing(steady.frequency)),
+            Some(Tone {
+                chirp,
+                ..changing(start)
+            }),
+            hit,
+        ];
         let mut least: Option<f32> = None;
-        for (at, chirp) in [(steady.frequency, 0.0), (start, chirp)] {
+        for start in starts.into_iter().flatten() {
             if self.tired(fit) {
                 break;
             }
             let mut trial = model.clone();
-            let tone = Tone {
-                modulated: true,
-                chirp,
-                ..Tone::steady(at, axis)
-            };
-            let _ = trial.tones.push(tone);
+            let _ = trial.tones.push(start);
             fit.refine(samples, &mut trial, STEPS);
+            if start.onset.is_some() {
+                for _ in 0..2 {
+                    residual.place_onset(samples, &mut trial);
+                    fit.refine(samples, &mut trial, STEPS);
+                }
+            }
             let stayed = trial
                 .tones
                 .last()
-                .is_some_and(|t| t.frequency.above(at).abs() * length_s < BESIDE);
+                .is_some_and(|t| t.frequency.above(start.frequency).abs() * length_s < BESIDE);
             let sound = stayed && self.sound(samples, &trial);
             if sound && least.is_none_or(|least| trial.squares < least) {
                 least = Some(trial.squares);

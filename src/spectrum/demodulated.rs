@@ -2,7 +2,7 @@
 //!
 //! A tone that changes within the window is spread over many cells of a periodogram. Turned back by a
 //! frequency near its own it is slow, and what its changing looks like can be tried on a few points
-//! instead of all samples: how fast it speeds up ([`Demodulated::ramp`]).
+//! instead of all samples: how fast it speeds up ([`Demodulated::ramp`]), when it was struck ([`Demodulated::struck`]).
 
 use super::fit::Model;
 use super::model::Samples;
@@ -23,7 +23,10 @@ const STEP: f32 = 0.5;
 const REACH: f32 = 3.0;
 
 /// Floats of lent memory a frame.
-const A_FRAME: usize = 6;
+const A_FRAME: usize = 8;
+
+/// Decays that are tried for what was struck, s: the fit finds what is between.
+const DECAYS_S: [f32; 4] = [0.03, 0.08, 0.2, 0.5];
 
 /// A residual turned back by a frequency: weighted sums over half a frame each.
 #[derive(Debug)]
@@ -32,6 +35,17 @@ pub(crate) struct Demodulated<'g> {
     im: &'g mut [f32],
     /// Middle of each half frame, window lengths.
     t: &'g mut [f32],
+    /// Sum of its samples' weights.
+    weight: &'g mut [f32],
+}
+
+/// Where a tone may have been struck.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Struck {
+    /// When, in window lengths from the middle.
+    pub(crate) onset: f32,
+    /// How fast it dies away, 1 a window length.
+    pub(crate) growth: f32,
 }
 
 impl<'g> Demodulated<'g> {
@@ -50,7 +64,7 @@ impl<'g> Demodulated<'g> {
         grid.fill(0.0);
         let (re, rest) = grid.split_at_mut(2 * n);
         let (im, rest) = rest.split_at_mut(2 * n);
-        let t = rest;
+        let (t, weight) = rest.split_at_mut(2 * n);
         model.tabulate(samples);
         samples.tabulate(k, &Tone::steady(frequency, axis));
         let total: f32 = samples.series_weight[..samples.slots].iter().sum();
@@ -83,8 +97,9 @@ impl<'g> Demodulated<'g> {
         for i in 0..2 * n {
             let (late, known) = late[i % 2];
             t[i] = samples.frame_t[i / 2] + late / known.max(f32::MIN_POSITIVE);
+            weight[i] = samples.frame_weight[i / 2] * known / total.max(f32::MIN_POSITIVE);
         }
-        Some(Self { re, im, t })
+        Some(Self { re, im, t, weight })
     }
 
     /// The frequency, in turns a window length from where it is seen from, and its change, turns a window length
@@ -104,6 +119,30 @@ impl<'g> Demodulated<'g> {
             }
         }
         (best.1, best.2)
+    }
+
+    /// When a tone that dies away may have been struck so that it holds most, the window being `length_s` long.
+    pub(crate) fn struck(&self, length_s: f32) -> Struck {
+        let mut best = (0.0, Struck::default());
+        for decay_s in DECAYS_S {
+            let growth = -length_s / decay_s;
+            // From the end on: what a tone that is struck there holds, and could.
+            let (mut re, mut im, mut could) = (0.0_f32, 0.0_f32, 0.0_f32);
+            for i in (0..self.t.len()).rev() {
+                let later = self.t.get(i + 1).map_or(0.0, |next| next - self.t[i]);
+                let left = libm::expf((growth * later).max(-60.0));
+                re = self.re[i] + left * re;
+                im = self.im[i] + left * im;
+                could = self.weight[i] + left * left * could;
+                let held = (re * re + im * im) / could.max(f32::MIN_POSITIVE);
+                if held > best.0 {
+                    let before = i.checked_sub(1).map_or(-1.0, |b| self.t[b]);
+                    let onset = 0.5 * (before + self.t[i]);
+                    best = (held, Struck { onset, growth });
+                }
+            }
+        }
+        best.1
     }
 
     /// Power at a frequency and its change.

@@ -15,6 +15,9 @@ const LONGEST_STEP: f32 = 0.3;
 /// A tone grows or dies away by no more than e to this power in a window.
 const MOST_GROWTH: f32 = 8.0;
 
+/// What was struck dies away by no more than e to this power in a window.
+const MOST_DECAY: f32 = 400.0;
+
 /// A step that lowers the sum of squares by less than this many noise variances is the last.
 const ENOUGH: f32 = 0.3;
 
@@ -240,9 +243,18 @@ impl Fit {
                     tone.frequency = tone.frequency.plus(turns / length_s);
                 }
                 Unknown::Chirp => tone.chirp += change.clamp(-1.0, 1.0),
-                Unknown::Growth => {
-                    tone.growth = (tone.growth + change).clamp(-MOST_GROWTH, MOST_GROWTH);
-                }
+                Unknown::Growth => match tone.onset {
+                    None => tone.growth = (tone.growth + change).clamp(-MOST_GROWTH, MOST_GROWTH),
+                    Some(onset) => {
+                        // It grows from its onset on, the regressor from the middle of the window.
+                        let before = tone.growth;
+                        tone.growth = (before + change).clamp(-MOST_DECAY, 0.0);
+                        let size = (1.0 + (tone.growth - before) * onset).clamp(0.3, 3.0);
+                        for j in tone.shape.fitted() {
+                            tone.shape.change(j, |c| *c = c.scale(size));
+                        }
+                    }
+                },
             }
         }
     }
@@ -265,6 +277,17 @@ impl Fit {
         length_s: f32,
         direction: &Direction,
     ) -> Deviation {
+        self.deviation_growing(regressors, i, length_s, (direction, 0.0))
+    }
+
+    /// The same of an amplitude that changes by `growing` where the tone's growth changes by one.
+    pub(crate) fn deviation_growing(
+        &self,
+        regressors: &Regressors,
+        i: usize,
+        length_s: f32,
+        (direction, growing): (&Direction, f32),
+    ) -> Deviation {
         let (mut of_hz, mut of_amplitude) = ([0.0; MOST], [0.0; MOST]);
         for (j, (r, unknown)) in regressors.list().iter().enumerate() {
             if usize::from(r.table) != i + 1 {
@@ -275,6 +298,7 @@ impl Fit {
                 Unknown::Re => of_amplitude[j] = along.re,
                 Unknown::Im => of_amplitude[j] = along.im,
                 Unknown::Frequency => of_hz[j] = 1.0 / length_s,
+                Unknown::Growth => of_amplitude[j] = growing,
                 _ => {}
             }
         }

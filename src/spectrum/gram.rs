@@ -90,8 +90,10 @@ impl Regressors {
         }
         for (i, tone) in free() {
             if tone.modulated && !tone.shape.is_zero() {
-                let turn = Complex::new(0.0, -0.5 * core::f32::consts::TAU);
-                regressors.add((i + 1, 2, None), turn, Unknown::Chirp);
+                if tone.onset.is_none() {
+                    let turn = Complex::new(0.0, -0.5 * core::f32::consts::TAU);
+                    regressors.add((i + 1, 2, None), turn, Unknown::Chirp);
+                }
                 regressors.add((i + 1, 1, None), one, Unknown::Growth);
             }
         }

@@ -35,6 +35,7 @@ mod load;
 mod model;
 mod motion;
 mod notch;
+mod onset;
 mod order;
 mod periodogram;
 mod phase;

@@ -249,7 +249,7 @@ impl Samples<'_> {
             let (c, s) = cos_sin(tone.frequency.phase(ns));
             let mut phasor = Complex::new(c, s) * blur(hz, spread, &self.even);
             if tone.modulated {
-                phasor = phasor.scale(tone.grown(t));
+                phasor = phasor.scale(tone.grown_within(t));
             }
             (*re, *im) = (phasor.re, phasor.im);
         }
@@ -265,7 +265,7 @@ impl Samples<'_> {
 
     /// A modulated tone's exact phasors at the samples of one slot, into the scratch rows, and their times
     /// into `row_t`: its phase is no product of frame and slot.
-    fn own_phasors(&mut self, tone: &Tone, slot: usize) {
+    pub(crate) fn own_phasors(&mut self, tone: &Tone, slot: usize) {
         let n = self.frames;
         let (ns, t) = (self.slot_ns[slot], self.slot_t[slot]);
         let blur = blur(tone.frequency.hz(), &self.spread[slot], &self.even);

@@ -1,6 +1,6 @@
 //! What a model leaves of the window: its periodogram and its noise, kept while the search asks for them.
 
-use super::demodulated::Demodulated;
+use super::demodulated::{Demodulated, Struck};
 use super::fit::{Fit, Model};
 use super::judge::Noise;
 use super::model::Samples;
@@ -69,6 +69,11 @@ impl<'g> Residual<'g> {
         self.strict = true;
         self.hopeless = false;
         self.forget();
+    }
+
+    /// Length of the window that was looked at last, s.
+    pub(crate) fn length_s(&self) -> f32 {
+        self.periodogram().map_or(0.0, |p| p.length_s)
     }
 
     /// Tones have to stand out of the noise as it is.
@@ -162,5 +167,24 @@ impl<'g> Residual<'g> {
         self.places = None;
         let seen = Demodulated::of(samples, model, at, self.grid);
         seen.map_or((0.0, 0.0), |seen| seen.ramp())
+    }
+
+    /// When what `model` leaves near a frequency along an axis may have been struck.
+    pub(crate) fn struck(
+        &mut self,
+        samples: &mut Samples<'_>,
+        model: &Model,
+        at: (Frequency, usize),
+    ) -> Option<Struck> {
+        self.places = None;
+        let seen = Demodulated::of(samples, model, at, self.grid)?;
+        Some(seen.struck(samples.length_s))
+    }
+
+    /// The onset of the last tone of `model`, which was struck about then, to one sample: where what the samples gain by it
+    /// from there on is most.
+    pub(crate) fn place_onset(&mut self, samples: &mut Samples<'_>, model: &mut Model) {
+        self.places = None;
+        super::onset::place(samples, model, self.grid);
     }
 }

@@ -60,6 +60,9 @@ const CHIRPS: [f32; 7] = [
 /// Tones this near each other, turns a window length, are near enough to be noise in a few cells.
 pub(super) const PAIR: f32 = 8.0;
 
+/// So many tones near one are noise in a few cells, or one that changes.
+const CLUSTER: usize = 3;
+
 /// So many tones are found before what is left is given up as noise.
 const FEW_TONES: usize = 3;
 
@@ -331,10 +334,14 @@ impl Search {
         let noise = residual.noise(strongest.axis);
         let early = model.tones.len() < FEW_TONES || residual.is_strict() || noise.is_white();
         let p = residual.periodogram().filter(|p| p.axis == strongest.axis);
-        !early
-            && p.is_some_and(|p| {
-                !noise.is_worth_a_fit(strongest.frequency.hz(), 0.5 * strongest.gain, &p)
-            })
+        let near =
+            |a: &Tone, b: &Tone| a.frequency.above(b.frequency).abs() * residual.length_s() < PAIR;
+        let cluster = |a: &Tone| model.tones.iter().filter(|b| near(a, b)).count() >= CLUSTER;
+        !early && model.tones.iter().any(cluster)
+            || !early
+                && p.is_some_and(|p| {
+                    !noise.is_worth_a_fit(strongest.frequency.hz(), 0.5 * strongest.gain, &p)
+                })
     }
 
     /// Makes `best` the model with the candidate that explains most, as a further tone, and says whether there is one. Those
@@ -635,7 +642,8 @@ impl Search {
         }
         let regressors = fit.weigh(samples, model);
         let mut weakest: Option<(usize, f32)> = None;
-        for (i, tone) in model.tones.iter().enumerate().filter(|(_, t)| !t.frozen) {
+        let steady = |t: &Tone| !t.frozen && t.onset.is_none();
+        for (i, tone) in model.tones.iter().enumerate().filter(|(_, t)| steady(t)) {
             let (eta, orbit) = largest(&tone.shape);
             let along = direction(eta, orbit.towards);
             let unit = fit.deviation(&regressors, i, samples.length_s, &along);

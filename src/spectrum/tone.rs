@@ -22,8 +22,10 @@ pub(crate) struct Tone {
     pub(crate) frozen: bool,
     /// What is at its alias frequency is taken out of every series.
     pub(crate) notched: bool,
-    /// `chirp` and `growth` are fitted.
+    /// `chirp` and `growth` are fitted; of what was struck `growth` alone.
     pub(crate) modulated: bool,
+    /// When it was struck, in window lengths from the middle: before that it is not there, and its shape is as it was then.
+    pub(crate) onset: Option<f32>,
 }
 
 impl Tone {
@@ -38,13 +40,26 @@ impl Tone {
             frozen: false,
             notched: false,
             modulated: false,
+            onset: None,
         }
     }
 
     /// How much larger it is at `t`.
     #[inline(never)]
     pub(crate) fn grown(&self, t: f32) -> f32 {
-        exp(self.growth * t)
+        match self.onset {
+            None => exp(self.growth * t),
+            Some(onset) if t >= onset => libm::expf((self.growth * (t - onset)).max(-60.0)),
+            Some(_) => 0.0,
+        }
+    }
+
+    /// How much larger it is `t` after the middle of a frame.
+    pub(crate) fn grown_within(&self, t: f32) -> f32 {
+        match self.onset {
+            None => self.grown(t),
+            Some(_) => libm::expf((self.growth * t).clamp(-20.0, 20.0)),
+        }
     }
 
     /// Highest power of t among the regressors.

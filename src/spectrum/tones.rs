@@ -264,7 +264,9 @@ impl Telling<'_> {
         let (eta, orbit) = largest(&tone.shape);
         let length_s = samples.length_s;
         let along = |towards: [Complex; 2]| {
-            fit.deviation(regressors, i, length_s, &direction(eta, towards))
+            let along = direction(eta, towards);
+            let growing = tone.onset.unwrap_or(0.0) * orbit.semi_major_px;
+            fit.deviation_growing(regressors, i, length_s, (&along, growing))
         };
         let unit = along(orbit.towards);
         (told.unit, told.unit_hz) = (unit.amplitude_px, unit.hz);
