@@ -198,7 +198,7 @@ fn harm(spool: &Path, at: usize, flip: u8) {
 #[test]
 fn a_harmed_spool() {
     let dir = dir("harmed");
-    let Some(mut broker) = Broker::start(&dir, "allow_anonymous true\npersistence true") else {
+    let Some(mut broker) = Broker::start(&dir, "allow_anonymous true") else {
         return;
     };
     let (mut masters, _slaves, names) = ports(1);
