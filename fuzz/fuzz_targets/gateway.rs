@@ -18,7 +18,7 @@ fn packets(bytes: &[u8], step: usize) -> (Vec<Packet>, bool) {
     for part in bytes.chunks(step) {
         decoder.push(part);
         loop {
-            match decoder.next() {
+            match decoder.take() {
                 Ok(Some(packet)) => packets.push(packet),
                 Ok(None) => break,
                 Err(_) => return (packets, false),

@@ -130,11 +130,11 @@ pub(super) struct Retry {
 }
 
 impl Retry {
-    /// The broker has accepted the connection.
-    pub(super) fn accepted(&mut self, now: Instant) {
+    /// The broker has accepted the connection; whether it was away before.
+    pub(super) fn accepted(&mut self, now: Instant) -> bool {
         self.since = Some(now);
-        self.absent = 0;
         self.said = None;
+        std::mem::take(&mut self.absent) > 0
     }
 
     /// It is lost: how long to wait, and what to say, if there is something new. A connection that

@@ -17,7 +17,7 @@ use rowtone_serial::receiver::Counters;
 
 /// How often the spool's state is saved.
 const SAVE: Duration = Duration::from_millis(500);
-/// After a connection was lost, its receivers get this long to be back before reports go out again: a
+/// When the broker was away, its receivers get this long to be back before reports go out again: a
 /// broker that has forgotten them acknowledges all the same.
 const GRACE: Duration = Duration::from_secs(3);
 /// A broker that acknowledges nothing for this long is given up.
@@ -169,11 +169,11 @@ impl<'a> Hub<'a> {
         match note {
             Note::Connected => {
                 self.say_of_broker("connected");
-                if std::mem::replace(&mut self.was_connected, true) {
+                let was_away = self.retry.accepted(now);
+                if std::mem::replace(&mut self.was_connected, true) || was_away {
                     self.send_at = now + GRACE;
                 }
                 self.connected = true;
-                self.retry.accepted(now);
                 self.say_hello(now);
             }
             Note::Acknowledged(number) => self.delivery.acknowledged(number, now),

@@ -144,7 +144,7 @@ fn serve(
             Err(error) if waits(&error) => continue,
             Err(error) => return Err(error),
         }
-        while let Some(packet) = decoder.next().map_err(|_| not_mqtt())? {
+        while let Some(packet) = decoder.take().map_err(|_| not_mqtt())? {
             let one = match packet {
                 Packet::Accepted if !accepted => {
                     accepted = true;

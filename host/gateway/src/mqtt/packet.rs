@@ -189,7 +189,7 @@ impl Decoder {
     ///
     /// # Errors
     /// What came is none; nothing behind it can be understood either.
-    pub fn next(&mut self) -> Result<Option<Packet>, NoMqtt> {
+    pub fn take(&mut self) -> Result<Option<Packet>, NoMqtt> {
         let Some((head, length)) = length(&self.bytes)? else {
             return Ok(None);
         };
@@ -267,7 +267,7 @@ mod tests {
         let (mut decoder, mut packets) = (Decoder::default(), vec![]);
         for part in bytes.chunks(step) {
             decoder.push(part);
-            while let Some(packet) = decoder.next().unwrap() {
+            while let Some(packet) = decoder.take().unwrap() {
                 packets.push(packet);
             }
         }
@@ -355,7 +355,7 @@ mod tests {
             for part in parts {
                 decoder.push(&part);
                 loop {
-                    match decoder.next() {
+                    match decoder.take() {
                         Ok(Some(_)) => {}
                         Ok(None) => break,
                         Err(NoMqtt) => return Ok(()),

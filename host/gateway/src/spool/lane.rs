@@ -171,6 +171,7 @@ impl Lane {
             }
             if self.read_at.offset >= length {
                 let Some((&next, _)) = rest.next() else {
+                    self.end(segment);
                     return Ok(());
                 };
                 self.note_gap(next);
@@ -216,6 +217,20 @@ impl Lane {
             self.ahead.push_back((Place { segment, offset }, record));
         }
         self.read_at.offset = start + whole as u64;
+    }
+
+    /// All is read. What the last file of an earlier run does not hold, though it should, is gone; and
+    /// where nothing is left to be acknowledged, the file is no longer needed.
+    fn end(&mut self, segment: u64) {
+        if self.growing == Some(segment) {
+            return;
+        }
+        self.note_gap(self.next_id);
+        if self.handed_out == self.known.acknowledged && self.memory.is_empty() {
+            self.known.acknowledged = self.next_id - 1;
+            self.handed_out = self.known.acknowledged;
+            self.acknowledged_at = self.read_at;
+        }
     }
 
     /// The record of this number comes next, so those before it that were not read are gone.

@@ -1,17 +1,17 @@
 //! Reports on disk until the broker has them.
 //!
-//! Every board has files of its own ([`lane`]), to which each of its reports is appended as a record
-//! with a checksum ([`record`]) before it is sent. What the broker has acknowledged is written down
-//! twice a second ([`state`]); files that it has whole are removed. After a crash the reports behind
+//! Every board has files of its own (`lane`), to which each of its reports is appended as a record
+//! with a checksum (`record`) before it is sent. What the broker has acknowledged is written down
+//! twice a second (`state`); files that it has whole are removed. After a crash the reports behind
 //! are sent once more, and a receiver drops those it has by board, session and number.
 //!
 //! - **Share**: when all together take more than allowed, the board that takes most gives up its
 //!   oldest file, so one that talks much pushes out none but itself.
-//! - **Power cut**: what was appended is synchronised with the disk every [`SYNC`] ([`sync`]), and it is
+//! - **Power cut**: what was appended is synchronised with the disk every `SYNC` (`sync`), and it is
 //!   written down up to where the boards need not be asked again after one, and after a crash.
 //! - **A disk that is full** ends nothing: acknowledged files go first, then the oldest of the board
 //!   that takes most; what cannot be written at all waits in memory, and is published from there.
-//! - **Whatever is lost** is counted and said when it happens ([`losses`]).
+//! - **Whatever is lost** is counted and said when it happens (`losses`).
 //! - **One gateway**: the directory is locked for as long as it is open.
 
 mod lane;
@@ -443,9 +443,12 @@ fn lock(dir: &Path) -> io::Result<File> {
     Ok(file)
 }
 
-/// The files of each board with their lengths, and how many others there are.
-fn list(dir: &Path) -> io::Result<(BTreeMap<String, BTreeMap<u64, u64>>, u32)> {
-    let (mut files, mut strays) = (BTreeMap::<String, BTreeMap<u64, u64>>::new(), 0);
+/// Of each board the lengths of its files, by their first records.
+type Files = BTreeMap<String, BTreeMap<u64, u64>>;
+
+/// The files of each board, and how many others there are.
+fn list(dir: &Path) -> io::Result<(Files, u32)> {
+    let (mut files, mut strays) = (Files::new(), 0);
     for entry in std::fs::read_dir(dir)? {
         let entry = entry?;
         let name = entry.file_name();

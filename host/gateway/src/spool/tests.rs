@@ -283,6 +283,23 @@ fn a_full_disk_ends_nothing() {
     std::fs::remove_dir_all(dir).unwrap();
 }
 
+/// A file under another board's name: its records are nobody's, which is said, and they do not wait for
+/// ever.
+#[test]
+fn a_file_of_another_name_is_no_board_s() {
+    let dir = dir("renamed");
+    let mut spool = open(&dir, LARGE, &["a"]);
+    push(&mut spool, "a", 0..3);
+    drop(spool);
+    std::fs::rename(dir.join(name::of("a", 1)), dir.join(name::of("b", 1))).unwrap();
+    let mut spool = open(&dir, LARGE, &["a", "b"]);
+    assert!(all(&mut spool).is_empty());
+    assert_eq!((spool.dropped(), spool.waiting()), (3, 0));
+    push(&mut spool, "b", 7..8);
+    assert_eq!(numbers(&mut spool, "b"), [7]);
+    std::fs::remove_dir_all(dir).unwrap();
+}
+
 #[test]
 fn what_cannot_be_published_is_kept_apart() {
     let dir = dir("aside");
