@@ -49,8 +49,8 @@ impl FileFlash {
         let flash = Self {
             file: File::open(path)?,
         };
-        let has = flash.file.metadata()?.len() as usize;
-        if has < flash.capacity() {
+        let meta = flash.file.metadata()?;
+        if !meta.is_file() || (meta.len() as usize) < flash.capacity() {
             return Err(io::ErrorKind::UnexpectedEof.into());
         }
         Ok(flash)
@@ -146,6 +146,7 @@ mod tests {
         let path = std::env::temp_dir().join(format!("rowtone-store-ro-{}", std::process::id()));
         let _ = std::fs::remove_file(&path);
         assert!(FileFlash::open_read_only(&path).is_err());
+        assert!(FileFlash::open_read_only(&std::env::temp_dir()).is_err());
         let mut store = Store::new(FileFlash::open(&path).unwrap(), 0).unwrap();
         let session = store.start().session;
         let changed = Settings {
