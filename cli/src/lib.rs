@@ -2,8 +2,10 @@
 //!
 //! - [`commands`]: one file a command, each with its options and what it does;
 //! - [`output`]: displacements as files, standard output line by line, progress;
-//! - [`stop`]: what a signal does.
+//! - [`stop`]: what a signal does;
+//! - `terminal`: a screen of text for the live view.
 
 pub mod commands;
 pub mod output;
 pub mod stop;
+mod terminal;

@@ -2,15 +2,11 @@
 
 use std::time::Instant;
 
-use ratatui::Frame;
-use ratatui::layout::{Constraint, Layout, Rect};
-use ratatui::style::{Color, Style, Stylize};
-use ratatui::text::{Line, Span};
-use ratatui::widgets::{Block, Paragraph};
 use rowtone::report::{Peak, Report};
 
 use super::history::{History, TREND};
-use super::screen::{Age, View};
+use super::view::{Age, View};
+use crate::terminal::{Block, Color, Line, Paragraph, Rect, Screen, Span, Style, Stylize, rows};
 use rowtone_report::{band_velocity, sentence, text::digits, velocity_mm_s_rms};
 
 /// Columns of a peak's numbers, and of what is noted behind its trend.
@@ -21,23 +17,23 @@ const VELOCITY: usize = 10;
 /// Columns left of the waterfall, for times.
 const TIMES: usize = 7;
 
-pub(super) fn draw(frame: &mut Frame<'_>, view: &View<'_>) {
+pub(super) fn draw(screen: &mut Screen, view: &View<'_>) {
     let newest = view.history.reports.front();
     let peaks = newest.map_or(0, |report| report.peaks.len());
     let notes = newest.map_or(0, |report| report.warnings.iter().count());
-    let rows = |count: usize| u16::try_from(count).unwrap_or(u16::MAX);
-    let half = frame.area().height / 2;
-    let [head, middle, below, foot] = Layout::vertical([
-        Constraint::Length(rows(2 + notes).min(half)),
-        Constraint::Length(rows(peaks.max(4) + 3).min(half)),
-        Constraint::Min(4),
-        Constraint::Length(1),
-    ])
-    .areas(frame.area());
-    frame.render_widget(Paragraph::new(top(view)), head);
-    frame.render_widget(table(&view.history, middle), middle);
-    frame.render_widget(waterfall(&view.history, below), below);
-    frame.render_widget(Paragraph::new(bottom(view)), foot);
+    let area = screen.area();
+    // The waterfall keeps four rows where there are as many.
+    let left = area.height.saturating_sub(5);
+    let head = u16::try_from(2 + notes).unwrap_or(u16::MAX);
+    let head = head.min(area.height / 2).min(left);
+    let middle = u16::try_from(peaks.max(4) + 3).unwrap_or(u16::MAX);
+    let middle = middle.min(area.height / 2).min(left - head);
+    let heights = [Some(head), Some(middle), None, Some(1)];
+    let [head, middle, below, foot] = rows(area, heights);
+    screen.render(&Paragraph::new(top(view)), head);
+    screen.render(&table(&view.history, middle), middle);
+    screen.render(&waterfall(&view.history, below), below);
+    screen.render(&Paragraph::new(vec![bottom(view)]), foot);
 }
 
 fn top<'a>(view: &'a View<'_>) -> Vec<Line<'a>> {
@@ -88,7 +84,7 @@ fn table(history: &History, area: Rect) -> Paragraph<'static> {
             lines.extend(report.peaks.iter().map(peak));
         }
     }
-    Paragraph::new(lines).block(Block::bordered().title(" peaks "))
+    Paragraph::new(lines).block(Block::titled(" peaks "))
 }
 
 /// How the columns of the table are laid out.
@@ -185,7 +181,7 @@ fn waterfall(history: &History, area: Rect) -> Paragraph<'static> {
     }
     lines.resize(rows, Line::default());
     lines.push(Line::from(axis(columns, max_hz)).dark_gray());
-    Paragraph::new(lines).block(Block::bordered().title(" waterfall: s ago, newest on top "))
+    Paragraph::new(lines).block(Block::titled(" waterfall: s ago, newest on top "))
 }
 
 /// Frequencies below the waterfall, at five places.
@@ -239,8 +235,8 @@ fn waterfall_row(
 fn bottom<'a>(view: &'a View<'_>) -> Line<'a> {
     let counters = view.board.counters();
     let alarm = |count: u64| match count {
-        0 => Style::new(),
-        _ => Style::new().fg(Color::Red).bold(),
+        0 => Style::default(),
+        _ => Style::default().fg(Color::Red).bold(),
     };
     Line::from(vec![
         format!("reports {}  ", counters.reports).into(),

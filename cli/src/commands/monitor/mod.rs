@@ -6,6 +6,7 @@ mod log;
 mod plain;
 mod screen;
 mod signals;
+mod view;
 
 use std::io::IsTerminal;
 use std::path::PathBuf;

@@ -1,55 +1,22 @@
-//! The live view: what it knows, and its loop.
+//! The live view's loop.
 
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender};
 use std::time::{Duration, Instant};
 
-use ratatui::crossterm::event::{self, Event as Input, KeyCode, KeyEventKind, KeyModifiers};
-use rowtone::report::Report;
-use rowtone::wire::Arrival;
+use crossterm::event::{self, Event as Input, KeyCode, KeyEventKind, KeyModifiers};
 
 use super::draw::draw;
 use super::history::History;
 use super::log::Log;
 use super::signals::Signals;
-use super::went_away;
+use super::view::View;
+use crate::terminal::Terminal;
 use rowtone_failure::Failure;
 use rowtone_serial::line::Event;
-use rowtone_serial::receiver::{Heard, Receiver as Board};
+use rowtone_serial::receiver::Receiver as Board;
 
 /// The screen is drawn this often at the most.
 const FRAME: Duration = Duration::from_millis(100);
-
-/// A board is silent when nothing has come for so many times as its last two reports were apart, and
-/// for so long at the least.
-const MISSED: u32 = 3;
-const SILENCE: Duration = Duration::from_secs(5);
-
-/// All that is shown.
-pub(super) struct View<'a> {
-    pub(super) port: &'a str,
-    /// Why the line is not there, if it is not.
-    pub(super) gone: Option<String>,
-    /// Whether to end when the line goes away.
-    once: bool,
-    /// What the board last said that is no report.
-    pub(super) said: String,
-    pub(super) session: u32,
-    pub(super) history: History,
-    pub(super) board: Board,
-    /// When the newest report came.
-    pub(super) heard: Option<Instant>,
-    /// When the port was opened.
-    open: Option<Instant>,
-}
-
-/// How long it is since the board was heard.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Age {
-    /// As long as is to be expected.
-    Fresh(Duration),
-    /// Longer.
-    Silent(Duration),
-}
 
 pub(super) fn run(
     port: &str,
@@ -58,7 +25,7 @@ pub(super) fn run(
     commands: &Sender<Vec<u8>>,
     log: Option<Log>,
 ) -> Result<(), Failure> {
-    let mut terminal = ratatui::try_init()
+    let mut terminal = Terminal::take()
         .map_err(|error| Failure::input(format!("terminal: cannot be used: {error}")))?;
     let mut view = View {
         port,
@@ -72,134 +39,54 @@ pub(super) fn run(
         open: None,
     };
     let signals = Signals::catch();
-    let done = view.follow(&mut terminal, events, commands, log, &signals);
-    ratatui::restore();
-    // This shows the cursor again.
+    let done = follow(&mut view, &mut terminal, events, commands, log, &signals);
+    // It is as it was before the signal ends the program.
     drop(terminal);
     signals.pass_on();
     done
 }
 
-impl View<'_> {
-    fn follow(
-        &mut self,
-        terminal: &mut ratatui::DefaultTerminal,
-        events: &Receiver<Event>,
-        commands: &Sender<Vec<u8>>,
-        mut log: Option<Log>,
-        signals: &Signals,
-    ) -> Result<(), Failure> {
-        let failed = |error| Failure::writing("terminal", &error);
+fn follow(
+    view: &mut View<'_>,
+    terminal: &mut Terminal,
+    events: &Receiver<Event>,
+    commands: &Sender<Vec<u8>>,
+    mut log: Option<Log>,
+    signals: &Signals,
+) -> Result<(), Failure> {
+    let failed = |error| Failure::writing("terminal", &error);
+    loop {
+        if signals.is_to_end() {
+            return Ok(());
+        }
+        if signals.is_to_pause() {
+            terminal.without(|| signals.pause()).map_err(failed)?;
+        }
+        terminal.draw(|screen| draw(screen, view)).map_err(failed)?;
+        let next = Instant::now() + FRAME;
         loop {
-            if signals.is_to_end() {
-                return Ok(());
-            }
-            if signals.is_to_pause() {
-                ratatui::restore();
-                let _ = terminal.show_cursor();
-                signals.pause();
-                *terminal = ratatui::try_init().map_err(failed)?;
-                terminal.clear().map_err(failed)?;
-            }
-            terminal.draw(|frame| draw(frame, self)).map_err(failed)?;
-            let next = Instant::now() + FRAME;
-            loop {
-                let wait = next.saturating_duration_since(Instant::now());
-                match events.recv_timeout(wait) {
-                    Ok(event) => self.take(event, log.as_mut())?,
-                    Err(RecvTimeoutError::Timeout) => break,
-                    // The file has ended; its last picture stays until the user leaves.
-                    Err(RecvTimeoutError::Disconnected) => {
-                        std::thread::sleep(wait);
-                        break;
-                    }
-                }
-                if wait.is_zero() {
+            let wait = next.saturating_duration_since(Instant::now());
+            match events.recv_timeout(wait) {
+                Ok(event) => view.take(event, log.as_mut())?,
+                Err(RecvTimeoutError::Timeout) => break,
+                // The file has ended; its last picture stays until the user leaves.
+                Err(RecvTimeoutError::Disconnected) => {
+                    std::thread::sleep(wait);
                     break;
                 }
             }
-            if let Some(command) = self.board.ask(Instant::now()) {
-                let _ = commands.send(command);
-            }
-            while event::poll(Duration::ZERO).map_err(failed)? {
-                if leaves(&event::read().map_err(failed)?) {
-                    return Ok(());
-                }
+            if wait.is_zero() {
+                break;
             }
         }
-    }
-
-    fn take(&mut self, event: Event, mut log: Option<&mut Log>) -> Result<(), Failure> {
-        match event {
-            Event::Open => {
-                self.gone = None;
-                self.open = Some(Instant::now());
-                self.board.set_line(true);
-            }
-            Event::Gone(why) if self.once => {
-                return Err(went_away(self.port, self.board.counters().reports, &why));
-            }
-            Event::Gone(why) => {
-                self.gone = Some(why);
-                self.board.set_line(false);
-            }
-            Event::End => self.gone = Some("the input has ended".to_owned()),
-            Event::Bytes(bytes) => {
-                let mut heard = vec![];
-                self.board.hear(&bytes, |one| heard.push(one));
-                for one in heard {
-                    match one {
-                        Heard::Report {
-                            session,
-                            report,
-                            arrival,
-                        } => {
-                            if let Some(log) = log.as_deref_mut() {
-                                log.append(session, &report)?;
-                            }
-                            self.report(session, &report, arrival);
-                        }
-                        Heard::Status(status) => {
-                            self.said = format!(
-                                "up {} s, {} reports dropped",
-                                status.uptime_ms / 1000,
-                                status.dropped_reports
-                            );
-                        }
-                        Heard::Reply(reply) => self.said = reply.text.to_string(),
-                    }
-                }
+        if let Some(command) = view.board.ask(Instant::now()) {
+            let _ = commands.send(command);
+        }
+        while event::poll(Duration::ZERO).map_err(failed)? {
+            if leaves(&event::read().map_err(failed)?) {
+                return Ok(());
             }
         }
-        Ok(())
-    }
-
-    fn report(&mut self, session: u32, report: &Report, arrival: Arrival) {
-        match arrival {
-            // One that came late goes into the log, but would upset the order here.
-            Arrival::Again => return,
-            Arrival::Restarted => self.history.clear(),
-            _ => {}
-        }
-        self.session = session;
-        self.heard = Some(Instant::now());
-        self.history.push(report);
-    }
-
-    /// How long ago the board was heard; none where neither it nor its line ever was.
-    pub(super) fn age(&self, now: Instant) -> Option<Age> {
-        let mut newest = self.history.reports.iter().map(|report| report.time_ms);
-        let apart_ms = match (newest.next(), newest.next()) {
-            (Some(last), Some(before)) => last.saturating_sub(before),
-            _ => 0,
-        };
-        // A gap in the reports is not how far apart they are.
-        let apart = Duration::from_millis(apart_ms.min(60_000));
-        let age = now.saturating_duration_since(self.heard.or(self.open)?);
-        Some(match age > (apart * MISSED).max(SILENCE) {
-            true => Age::Silent(age),
-            false => Age::Fresh(age),
-        })
     }
 }
 
@@ -213,7 +100,10 @@ fn leaves(input: &Input) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use ratatui::{Terminal, backend::TestBackend};
+    use rowtone::report::Report;
+
+    use super::super::view::Age;
+    use crate::terminal::Screen;
 
     fn view() -> View<'static> {
         View {
@@ -230,9 +120,9 @@ mod tests {
     }
 
     fn screen(view: &View<'_>, width: u16, height: u16) -> String {
-        let mut terminal = Terminal::new(TestBackend::new(width, height)).unwrap();
-        terminal.draw(|frame| draw(frame, view)).unwrap();
-        terminal.backend().to_string()
+        let mut screen = Screen::new(width, height);
+        draw(&mut screen, view);
+        screen.to_string()
     }
 
     fn hear(view: &mut View<'_>, report: Report) {
