@@ -6,6 +6,7 @@
 //! - `terminal`: a screen of text for the live view.
 
 pub mod commands;
+mod failures;
 pub mod output;
 pub mod stop;
 mod terminal;

@@ -8,6 +8,7 @@ use rowtone::report::{MAX_PEAKS, PeakShape, Report, Warnings};
 use rowtone::tracker::Axes;
 use rowtone::wire::{Message, text as wire_text};
 
+use crate::failures;
 use crate::output::Out;
 use crate::output::progress::Progress;
 use rowtone_clip::{CameraArgs, Feed};
@@ -98,7 +99,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     }
     // What cannot be written is said before anything is measured.
     if let Some(path) = &args.plot {
-        rowtone_plot::check_ending(path)?;
+        rowtone_plot::check_ending(path).map_err(failures::plot)?;
         WholeFile::check(path).map_err(|e| Failure::writing(&path.display().to_string(), &e))?;
     }
     let session = session();
@@ -107,7 +108,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         let may_wait = !args.camera.is_pipe();
         Sender::open(port, session, &as_a_board_says(args), may_wait)
     });
-    let serial = serial.transpose()?;
+    let serial = serial.transpose().map_err(failures::serial)?;
     let mut feed = Feed::open(&args.camera)?;
     feed.stop_when(crate::stop::on_signals());
     let plan = Plan::new(
@@ -285,8 +286,8 @@ impl Outlets {
     fn close(self) -> Result<(), Failure> {
         let drawn = self.picture.map_or(Ok(()), |picture| picture.save());
         let sent = self.serial.map_or(Ok(None), Sender::finish);
-        drawn?;
-        if let Some(note) = sent? {
+        drawn.map_err(failures::plot)?;
+        if let Some(note) = sent.map_err(failures::serial)? {
             self.progress.note(&note);
         }
         Ok(())

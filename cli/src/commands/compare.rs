@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use rowtone::camera::Timing;
 
+use crate::failures;
 use host_sim::{Config, Scene, Tone};
 use rowtone_failure::Failure;
 use rowtone_lab::methods::core::Core;
@@ -87,7 +88,7 @@ fn size(text: &str) -> Result<(u32, u32), String> {
 /// [`Failure::Usage`] for a clip that cannot be simulated.
 pub fn run(args: &Args) -> Result<(), Failure> {
     if let Some(path) = &args.plot {
-        rowtone_plot::check_ending(path)?;
+        rowtone_plot::check_ending(path).map_err(failures::plot)?;
     }
     let looks = if args.scene.is_empty() {
         &Look::ALL[..]
@@ -111,7 +112,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         scenes.push((look.name().to_owned(), summaries));
     }
     if let Some(path) = &args.plot {
-        rowtone_plot::write(path, &summary::figure(&scenes))?;
+        rowtone_plot::write(path, &summary::figure(&scenes)).map_err(failures::plot)?;
     }
     let title = format!(
         "{}x{}, {} frames at 60 fps, {} Hz, {} px, seeds {} to {}\n\n",

@@ -6,7 +6,7 @@ use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use rowtone_failure::Failure;
-use rowtone_gateway::{Config, Totals, run as run_gateway};
+use rowtone_gateway::{Config, GatewayError, Totals, run as run_gateway};
 
 /// Options of `rowtone gateway`.
 #[derive(Debug, clap::Args)]
@@ -32,9 +32,9 @@ pub struct Args {
 /// # Errors
 /// [`Failure::Input`] when the configuration is wrong or the spool cannot be written.
 pub fn run(args: &Args) -> Result<(), Failure> {
-    let config = Config::read(&args.config)?;
+    let config = Config::read(&args.config).map_err(refused)?;
     if args.check {
-        rowtone_gateway::check(&config, &args.config)?;
+        rowtone_gateway::check(&config, &args.config).map_err(refused)?;
         let boards = config.boards.len();
         let plural = if boards == 1 { "" } else { "s" };
         println!("{}: right, {boards} board{plural}", args.config.display());
@@ -52,12 +52,16 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         bad,
         dropped,
         waiting,
-    } = run_gateway(&config, seconds, &stopped_by_signal())?;
+    } = run_gateway(&config, seconds, &stopped_by_signal()).map_err(refused)?;
     println!(
         "heard {heard}, acknowledged {acknowledged}, lost on the lines {lost}, bad frames {bad}, \
          dropped from the spool {dropped}, waiting {waiting}"
     );
     Ok(())
+}
+
+fn refused(error: GatewayError) -> Failure {
+    Failure::input(error.to_string())
 }
 
 /// Set once the program is asked to end.

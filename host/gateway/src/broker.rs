@@ -9,10 +9,10 @@ use std::time::{Duration, Instant};
 
 use rustls::pki_types::{CertificateDer, pem::PemObject};
 
+use super::error::GatewayError;
 use super::mqtt::connection::{self, Client, Endpoint, KEEP_ALIVE_S, Loss};
 use super::mqtt::packet::{self, Hello, MAX_STRING, Message};
 use super::{Input, config::Broker};
-use rowtone_failure::Failure;
 
 /// Checked once at the start: how to reach the broker.
 #[derive(Clone)]
@@ -27,19 +27,21 @@ impl Address {
     ///
     /// # Errors
     /// One line that names the key and the file.
-    pub(super) fn new(broker: &Broker) -> Result<Self, Failure> {
-        let unreadable = |key: &str, path: &Path, why: String| {
-            Failure::input(format!("broker.{key}: {}: {why}", path.display()))
+    pub(super) fn new(broker: &Broker) -> Result<Self, GatewayError> {
+        let unreadable = |key, path: &Path, why: String| GatewayError::File {
+            key,
+            path: path.to_path_buf(),
+            why,
         };
         let password = match &broker.password_file {
             None => broker.password.clone(),
             Some(path) => {
                 let text = fs::read_to_string(path)
-                    .map_err(|error| unreadable("password_file", path, error.to_string()))?;
+                    .map_err(|error| unreadable("broker.password_file", path, error.to_string()))?;
                 let text = text.trim_end_matches(['\r', '\n']);
                 if text.len() > MAX_STRING {
                     let why = format!("longer than {MAX_STRING} bytes");
-                    return Err(unreadable("password_file", path, why));
+                    return Err(unreadable("broker.password_file", path, why));
                 }
                 Some(text.to_owned())
             }
@@ -47,7 +49,7 @@ impl Address {
         let tls = match &broker.tls_ca {
             None => None,
             Some(path) => {
-                let tls = tls(path).map_err(|why| unreadable("tls_ca", path, why))?;
+                let tls = tls(path).map_err(|why| unreadable("broker.tls_ca", path, why))?;
                 Some(Arc::new(tls))
             }
         };

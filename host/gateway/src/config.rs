@@ -6,9 +6,9 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 use toml::Spanned;
 
+use super::error::GatewayError;
 use super::mqtt::packet::is_topic;
 use super::spool::record::MAX_NAME;
-use rowtone_failure::Failure;
 use rowtone_serial::port::PortName;
 
 /// What to read and where to send it.
@@ -107,11 +107,11 @@ impl Config {
     ///
     /// # Errors
     /// One line that names the file, the line and the key.
-    pub fn read(path: &Path) -> Result<Self, Failure> {
-        let text = std::fs::read_to_string(path).map_err(|error| {
-            Failure::input(format!("{}: cannot be read: {error}", path.display()))
-        })?;
-        Self::parse(&text).map_err(|why| Failure::input(format!("{}:{why}", path.display())))
+    pub fn read(path: &Path) -> Result<Self, GatewayError> {
+        let named = || path.to_path_buf();
+        let text = std::fs::read_to_string(path)
+            .map_err(|why| GatewayError::Unreadable { path: named(), why })?;
+        Self::parse(&text).map_err(|why| GatewayError::Config { path: named(), why })
     }
 
     /// Reads the file's text; an error starts with the number of the line.

@@ -4,18 +4,18 @@ use std::path::{Path, PathBuf};
 
 use super::broker::Address;
 use super::config::Config;
-use rowtone_failure::Failure;
+use super::error::GatewayError;
 
 /// Checks what [`Config::read`] cannot see in the text: that the files it names are there, that no
 /// device is named twice, and who reads the password.
 ///
 /// # Errors
 /// One line that names the key and the file.
-pub fn check(config: &Config, path: &Path) -> Result<(), Failure> {
+pub fn check(config: &Config, path: &Path) -> Result<(), GatewayError> {
     Address::new(&config.broker)?;
     twins(config)?;
     match open_secret(config, path) {
-        Some(why) => Err(Failure::input(why)),
+        Some(why) => Err(GatewayError::OpenSecret(why)),
         None => Ok(()),
     }
 }
@@ -24,7 +24,7 @@ pub fn check(config: &Config, path: &Path) -> Result<(), Failure> {
 ///
 /// # Errors
 /// One line that names both.
-pub(super) fn twins(config: &Config) -> Result<(), Failure> {
+pub(super) fn twins(config: &Config) -> Result<(), GatewayError> {
     let mut seen: Vec<(PathBuf, Option<u64>, &str)> = vec![];
     for board in &config.boards {
         let given = PathBuf::from(&board.port.path);
@@ -35,12 +35,11 @@ pub(super) fn twins(config: &Config) -> Result<(), Failure> {
             one.0 == real || (number.is_some() && one.1 == number)
         };
         if let Some((_, _, other)) = seen.iter().find(same) {
-            return Err(Failure::input(format!(
-                "board.port: {}: {} and {other} are one and the same device, {}",
-                board.port.path,
-                board.name,
-                real.display()
-            )));
+            return Err(GatewayError::Twins {
+                port: board.port.path.clone(),
+                boards: [board.name.clone(), (*other).to_owned()],
+                device: real,
+            });
         }
         seen.push((real, number, &board.name));
     }
@@ -91,7 +90,11 @@ mod tests {
     use super::*;
     use std::os::unix::fs::{PermissionsExt, symlink};
 
-    fn config(dir: &Path, broker: &str, ports: [&str; 2]) -> Result<(Config, PathBuf), Failure> {
+    fn config(
+        dir: &Path,
+        broker: &str,
+        ports: [&str; 2],
+    ) -> Result<(Config, PathBuf), GatewayError> {
         let path = dir.join("gateway.toml");
         let [a, b] = ports;
         let text = format!(

@@ -10,6 +10,7 @@
 mod broker;
 mod config;
 mod delivery;
+mod error;
 mod files;
 mod hub;
 mod lines;
@@ -25,10 +26,10 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use broker::Address;
 pub use config::{Board, Broker, Config, Payload};
+pub use error::GatewayError;
 pub use files::{check, open_secret};
 use hub::Hub;
 use mqtt::connection::Note;
-use rowtone_failure::Failure;
 use rowtone_serial::receiver::Counters;
 use spool::Spool;
 use spool::record::Entry;
@@ -72,23 +73,27 @@ enum Input {
 /// broker ends it.
 ///
 /// # Errors
-/// [`Failure::Input`] when a file of the configuration or the spool cannot be used at the start.
-pub fn run(config: &Config, limit: Option<Duration>, stop: &AtomicBool) -> Result<Totals, Failure> {
+/// [`GatewayError`] when a file of the configuration or the spool cannot be used at the start.
+pub fn run(
+    config: &Config,
+    limit: Option<Duration>,
+    stop: &AtomicBool,
+) -> Result<Totals, GatewayError> {
     let address = Address::new(&config.broker)?;
     files::twins(config)?;
     let dir = &config.spool.dir;
     let max_bytes = u64::from(config.spool.max_mb) << 20;
     let boards = config.boards.iter().map(|board| board.name.as_str());
-    let spool = Spool::open(dir.clone(), max_bytes, boards)
-        .map_err(|error| Failure::input(format!("spool.dir: {}: {error}", dir.display())))?;
+    let spool = Spool::open(dir.clone(), max_bytes, boards).map_err(|why| GatewayError::Spool {
+        dir: dir.clone(),
+        why,
+    })?;
     let (to, inputs) = channel();
     for (index, board) in config.boards.iter().enumerate() {
         let complete = spool.complete_of(&board.name);
-        lines::listen(index, board, complete, to.clone()).map_err(|error| {
-            Failure::input(format!(
-                "board {}: no thread for its line: {error}",
-                board.name
-            ))
+        lines::listen(index, board, complete, to.clone()).map_err(|why| GatewayError::Thread {
+            board: board.name.clone(),
+            why,
         })?;
     }
     let mut hub = Hub::new(config, address, spool, to);

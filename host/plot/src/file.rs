@@ -4,9 +4,9 @@ use std::path::Path;
 
 use plotters::coord::Shift;
 use plotters::prelude::{DrawingArea, DrawingBackend, IntoDrawingArea, SVGBackend};
-use rowtone_failure::Failure;
 
 use crate::canvas::{Canvas, Pen};
+use crate::error::PlotError;
 
 /// Pixels of a PNG for one unit of the drawing.
 const SCALE: f32 = 1.5;
@@ -66,29 +66,25 @@ pub fn png(drawing: &impl Drawing) -> Result<Vec<u8>, DrawError> {
 /// Writes a drawing, as what the file's ending says.
 ///
 /// # Errors
-/// [`Failure::Input`] when it cannot be drawn or written.
-pub fn write(path: &Path, drawing: &impl Drawing) -> Result<(), Failure> {
-    let name = path.display();
+/// [`PlotError`] when it cannot be drawn or written.
+pub fn write(path: &Path, drawing: &impl Drawing) -> Result<(), PlotError> {
     let bytes = match ending(path) {
         Some(Ending::Png) => png(drawing),
         _ => svg(drawing).map(String::into_bytes),
     };
-    let bytes =
-        bytes.map_err(|error| Failure::input(format!("{name}: cannot be drawn: {error}")))?;
-    rowtone_files::write(path, bytes).map_err(|error| Failure::writing(&name.to_string(), &error))
+    let path = || path.to_path_buf();
+    let bytes = bytes.map_err(|why| PlotError::Draw { path: path(), why })?;
+    rowtone_files::write(&path(), bytes).map_err(|why| PlotError::Write { path: path(), why })
 }
 
 /// Whether a picture of this name can be drawn.
 ///
 /// # Errors
-/// [`Failure::Usage`] when its ending is neither `.svg` nor `.png`.
-pub fn check_ending(path: &Path) -> Result<(), Failure> {
+/// [`PlotError::Ending`] when its ending is neither `.svg` nor `.png`.
+pub fn check_ending(path: &Path) -> Result<(), PlotError> {
     match ending(path) {
         Some(_) => Ok(()),
-        None => Err(Failure::usage(format!(
-            "--plot {}: want a file that ends in .svg or .png",
-            path.display()
-        ))),
+        None => Err(PlotError::Ending(path.to_path_buf())),
     }
 }
 

@@ -5,6 +5,7 @@
 
 mod canvas;
 mod draw;
+mod error;
 mod file;
 mod glyphs;
 mod residual;
@@ -16,11 +17,11 @@ use std::path::PathBuf;
 use rowtone::report::Report;
 use rowtone::timeline::Sample;
 
+pub use error::PlotError;
 pub use file::{DrawError, Drawing, check_ending, png, svg, write};
 
 use self::residual::Fit;
 use self::spectrogram::Spectrogram;
-use rowtone_failure::Failure;
 
 /// Points of the noise floor.
 const FLOOR_POINTS: usize = 600;
@@ -132,8 +133,8 @@ impl Picture {
     /// Draws the picture and writes it. Nothing is written when there was no report.
     ///
     /// # Errors
-    /// [`Failure::Input`] when the file cannot be written.
-    pub fn save(&self) -> Result<(), Failure> {
+    /// [`PlotError`] when it cannot be drawn, or the file cannot be written.
+    pub fn save(&self) -> Result<(), PlotError> {
         let Some((report, fit)) = &self.last else {
             return Ok(());
         };

@@ -5,8 +5,8 @@ use std::io::{ErrorKind, Read, Write};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::Duration;
 
+use crate::error::SerialError;
 use crate::port::{PortName, open_reader};
-use rowtone_failure::Failure;
 
 /// How long to wait before a port that went away is tried again.
 const AGAIN: Duration = Duration::from_millis(500);
@@ -32,13 +32,13 @@ pub enum Event {
 /// for from the start. Files and standard input are read once.
 ///
 /// # Errors
-/// [`Failure::Input`] where the first opening failed and the port must be there.
+/// [`SerialError`] where the first opening failed and the port must be there.
 pub fn follow(
     name: &PortName,
     must_be_there: bool,
     commands: &Receiver<Vec<u8>>,
     mut event: impl FnMut(Event) -> bool,
-) -> Result<(), Failure> {
+) -> Result<(), SerialError> {
     let is_stream = name.path == "-"
         || std::fs::metadata(&name.path).is_ok_and(|meta| meta.is_file() || is_pipe(&meta));
     if is_stream {
@@ -99,13 +99,13 @@ const ROOM: usize = 6;
 ///
 /// # Errors
 /// There are not so many.
-fn leaving_room() -> Result<Vec<File>, Failure> {
+fn leaving_room() -> Result<Vec<File>, SerialError> {
     let some_file = if cfg!(unix) { "/dev/null" } else { "NUL" };
     let held: std::io::Result<Vec<File>> = (0..ROOM).map(|_| File::open(some_file)).collect();
-    held.map_err(|error| Failure::input(format!("no port can be opened: {error}")))
+    held.map_err(SerialError::NoRoom)
 }
 
-fn read_stream(name: &PortName, mut event: impl FnMut(Event) -> bool) -> Result<(), Failure> {
+fn read_stream(name: &PortName, mut event: impl FnMut(Event) -> bool) -> Result<(), SerialError> {
     let mut from = open_reader(name)?;
     let mut bytes = [0; 4096];
     event(Event::Open);
@@ -119,10 +119,10 @@ fn read_stream(name: &PortName, mut event: impl FnMut(Event) -> bool) -> Result<
             }
             Err(error) if waits(error.kind()) => {}
             Err(error) => {
-                return Err(Failure::input(format!(
-                    "{}: cannot be read: {error}",
-                    name.path
-                )));
+                return Err(SerialError::Read {
+                    path: name.path.clone(),
+                    why: error,
+                });
             }
         }
     }
@@ -136,8 +136,8 @@ fn read_stream(name: &PortName, mut event: impl FnMut(Event) -> bool) -> Result<
 /// no longer received.
 ///
 /// # Errors
-/// [`Failure::Input`] where the port cannot be opened.
-pub fn listen(name: &PortName) -> Result<(Receiver<Event>, Sender<Vec<u8>>), Failure> {
+/// [`SerialError`] where the port cannot be opened.
+pub fn listen(name: &PortName) -> Result<(Receiver<Event>, Sender<Vec<u8>>), SerialError> {
     let (events_to, events) = channel();
     let (commands, commands_from) = channel();
     let (result_to, result) = channel();

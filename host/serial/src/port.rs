@@ -12,7 +12,7 @@ use std::time::Duration;
 
 use serialport::SerialPort;
 
-use rowtone_failure::Failure;
+use crate::error::SerialError;
 
 /// What a board uses unless it is told otherwise.
 const USUAL_BAUD: u32 = 115_200;
@@ -70,17 +70,15 @@ impl PortName {
     /// Opens the device: 8 data bits, no parity, 1 stop bit, not locked against others.
     ///
     /// # Errors
-    /// [`Failure::Input`] when it cannot be opened.
-    pub fn open(&self) -> Result<Box<dyn SerialPort>, Failure> {
+    /// [`SerialError`] when it cannot be opened.
+    pub fn open(&self) -> Result<Box<dyn SerialPort>, SerialError> {
         serialport::new(&self.path, self.baud)
             .timeout(STEP)
             .exclusive(false)
             .open()
-            .map_err(|error| {
-                Failure::input(format!(
-                    "serial port {}: cannot be opened: {error}",
-                    self.path
-                ))
+            .map_err(|why| SerialError::Open {
+                port: self.path.clone(),
+                why,
             })
     }
 }
@@ -96,15 +94,17 @@ pub(crate) fn may_go_on(error: &io::Error) -> bool {
 /// Something to read bytes from: a port, a file, or `-` for standard input.
 ///
 /// # Errors
-/// [`Failure::Input`] when it cannot be opened.
-pub fn open_reader(name: &PortName) -> Result<Box<dyn Read>, Failure> {
+/// [`SerialError`] when it cannot be opened.
+pub fn open_reader(name: &PortName) -> Result<Box<dyn Read>, SerialError> {
     if name.path == "-" {
         return Ok(Box::new(io::stdin()));
     }
     let is_file = std::fs::metadata(&name.path).is_ok_and(|meta| meta.is_file() || is_fifo(&meta));
     if is_file {
-        let file = File::open(&name.path)
-            .map_err(|e| Failure::input(format!("{}: cannot be opened: {e}", name.path)))?;
+        let file = File::open(&name.path).map_err(|why| SerialError::OpenFile {
+            path: name.path.clone(),
+            why,
+        })?;
         return Ok(Box::new(file));
     }
     Ok(Box::new(Patient(name.open()?)))

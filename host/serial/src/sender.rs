@@ -21,8 +21,8 @@ use rowtone::report::Report;
 use rowtone::wire::SettingsOrigin;
 use serialport::SerialPort;
 
+use crate::error::SerialError;
 use crate::port::{PortName, may_go_on};
-use rowtone_failure::Failure;
 
 /// Reports kept for a line that is slow and a host that missed some.
 const KEPT: u32 = 64;
@@ -68,15 +68,14 @@ impl Sender {
     /// slow. `settings` are those in use, for a host that asks.
     ///
     /// # Errors
-    /// [`Failure::Input`] when the port cannot be opened.
+    /// [`SerialError`] when the port cannot be opened, or the settings are none.
     pub fn open(
         name: &PortName,
         session: u32,
         settings: &Settings,
         may_wait: bool,
-    ) -> Result<Self, Failure> {
-        let console = console(session, settings)
-            .map_err(|error| Failure::usage(format!("--serial: {error}")))?;
+    ) -> Result<Self, SerialError> {
+        let console = console(session, settings).map_err(SerialError::Settings)?;
         let mut port = name.open()?;
         // It was opened with a longer one, which is right for readers.
         let _ = port.set_timeout(STEP);
@@ -122,11 +121,11 @@ impl Sender {
     /// tell the user, if anything.
     ///
     /// # Errors
-    /// [`Failure::Input`] when the port went away, or was stuck with reports left.
-    pub fn finish(mut self) -> Result<Option<String>, Failure> {
+    /// [`SerialError::Stopped`] when the port went away, or was stuck with reports left.
+    pub fn finish(mut self) -> Result<Option<String>, SerialError> {
         self.end();
         match self.complaint() {
-            Some(text) => Err(Failure::input(text)),
+            Some(text) => Err(SerialError::Stopped(text)),
             None => Ok(self.outcome.as_ref().and_then(|ended| {
                 (ended.dropped > 0).then(|| {
                     format!(

@@ -110,7 +110,7 @@ impl Folder {
     /// # Errors
     /// [`Failure::Input`] where it cannot be drawn or written.
     pub fn drawing(&self, name: &str, drawing: &impl Drawing) -> Result<(), Failure> {
-        rowtone_plot::write(&self.file(name), drawing)
+        rowtone_plot::write(&self.file(name), drawing).map_err(|e| Failure::input(e.to_string()))
     }
 
     /// Writes a sound, its peak at nine tenths of full scale, 16 bits.
