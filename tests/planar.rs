@@ -214,6 +214,26 @@ fn rows_reach_the_bound_along_both_axes() {
     }
 }
 
+/// Motion by whole rows is read against the row that is seen: the gain stays within 1.5 %, and it leaks into the other axis by no
+/// more than 0.5 %.
+#[test]
+fn motion_by_whole_rows_is_followed() {
+    for (texture, x, y) in [
+        (Texture::Even, 0.0, 1.0),
+        (Texture::Leaning(0.52), 0.0, 1.0),
+    ] {
+        let fit = of(texture, x, y, Axes::Xy);
+        println!("{texture:?} {x} {y}: {fit:.4?}");
+        assert!((fit.gain[1][1] - 1.0).abs() < 0.015, "{:?}", fit.gain);
+        assert!(fit.gain[0][1].abs() < 0.005, "{:?}", fit.gain);
+        assert!(
+            x == 0.0 || (fit.gain[0][0] - 1.0).abs() < 0.01,
+            "{:?}",
+            fit.gain
+        );
+    }
+}
+
 /// What all edges leave unknown is not made up: only the motion across them is read, and the direction is that of the edges.
 #[test]
 fn edges_that_lean_one_way_tell_one_direction() {

@@ -4,7 +4,7 @@ set -euo pipefail
 
 usage() {
     cat >&2 <<'USAGE'
-usage: boards/mps2-an505/run.sh CLIP.y4m (--line-time-us T | --calibration FILE) [--exposure-us T] [--fps F] [--window S] [--icount]
+usage: boards/mps2-an505/run.sh CLIP.y4m (--line-time-us T | --calibration FILE) [--exposure-us T] [--fps F] [--window S] [--axes x|xy] [--icount]
 example: boards/mps2-an505/run.sh motor.y4m --line-time-us 40 --exposure-us 500 --icount
 
   --line-time-us T   time from one row to the next
@@ -12,6 +12,7 @@ example: boards/mps2-an505/run.sh motor.y4m --line-time-us 40 --exposure-us 500 
   --exposure-us T    exposure of a row (default: the calibration's, or 0)
   --fps F            frame rate, Hz (default: the clip's)
   --window S         length of a report's window, s (default 1.0)
+  --axes x|xy        motion along the rows alone, or along rows and columns (default x)
   --icount           count instructions, and print one line of figures at the end
 USAGE
     exit 2
@@ -19,7 +20,7 @@ USAGE
 
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 root=$(cd "$here/../.." && pwd)
-clip='' line_time='' exposure='' calibration='' fps='' window=1.0 icount=0
+clip='' line_time='' exposure='' calibration='' fps='' window=1.0 axes=1 icount=0
 while [ $# -gt 0 ]; do
     case $1 in
         --line-time-us | --exposure-us | --fps | --window)
@@ -30,6 +31,14 @@ while [ $# -gt 0 ]; do
                 --exposure-us) exposure=$2 ;;
                 --fps) fps=$2 ;;
                 --window) window=$2 ;;
+            esac
+            shift 2
+            ;;
+        --axes)
+            case ${2:-} in
+                x) axes=1 ;;
+                xy) axes=2 ;;
+                *) usage ;;
             esac
             shift 2
             ;;
@@ -72,7 +81,7 @@ firmware=$("$root/tools/embedded-cargo.sh" --where firmware rowtone-mps2-an505)
 scaled() { awk -v v="$1" -v by="$2" 'BEGIN { printf "%.0f", v * by }'; }
 words="rowtone line_time_ps=$(scaled "$line_time" 1e6) exposure_ns=$(scaled "$exposure" 1e3) window_ms=$(scaled "$window" 1e3)"
 [ -z "$fps" ] || words+=" fps_uhz=$(scaled "$fps" 1e6)"
-words+=" icount=$icount clip=$(realpath "$clip")"
+words+=" axes=$axes icount=$icount clip=$(realpath "$clip")"
 counting=()
 [ "$icount" = 0 ] || counting=(-icount shift=7)
 exec qemu-system-arm -M mps2-an505 -display none -monitor none -serial stdio "${counting[@]}" \

@@ -51,7 +51,7 @@ fn six_frames_have_the_displacements_of_six_frames() {
     let (stdout, stderr) = texts(&output);
     assert!(output.status.success(), "{stderr}");
     let mut lines = stdout.lines();
-    assert_eq!(lines.next(), Some("t_s,row,d_px,sd_px"));
+    assert_eq!(lines.next(), Some("t_s,row,x_px,x_sd_px,y_px,y_sd_px"));
     let rows: Vec<Vec<&str>> = lines.map(|line| line.split(',').collect()).collect();
     assert_eq!(rows.len(), 6 * 120);
     assert!(rows.iter().filter(|row| !row[2].is_empty()).count() > 600);

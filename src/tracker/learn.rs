@@ -185,7 +185,8 @@ impl Tracker<'_> {
             if let Some(l) = self.store.learning_mut(row) {
                 l.shift_px += (shift_px - l.shift_px) / f32::from(frames);
             }
-            self.store.note_down(row, down_px, f32::from(frames));
+            let total_px = self.planar.total_down_px();
+            self.store.note_down(row, total_px, f32::from(frames));
             // A better reference at once, then ever more rarely: the work must stay small.
             if matches!(frames, 1 | 4 | 16) && !self.store.is_planar() {
                 self.store.build(row);

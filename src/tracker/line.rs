@@ -259,7 +259,7 @@ impl Tracker<'_> {
                 return Err(None);
             }
             self.note_fit(true);
-            self.after_check(row, pixels.pixels(), Some(measured.shift_px));
+            self.after_check([row, row], pixels.pixels(), Some(measured.shift_px));
         } else if self.schedule.background {
             // The reference is not being moved.
             self.work_in_background::<R::P>(row);
@@ -313,7 +313,13 @@ impl Tracker<'_> {
         }
         if self.stage != Stage::Tracking {
             self.counts.learning = self.counts.learning.wrapping_add(1);
-            self.learn(row, pixels.pixels(), found);
+            let row = match self.store.is_planar() {
+                true => self.planar.read_row(),
+                false => Some(row),
+            };
+            if let Some(row) = row {
+                self.learn(row, pixels.pixels(), found);
+            }
             return Err(Rejected::Learning);
         }
         self.settle_fast_path(line.frame);
@@ -355,7 +361,10 @@ impl Tracker<'_> {
         if self.store.is_planar() {
             self.planar.fast = FastRows {
                 frame,
-                until_row: self.schedule.fast_path.until_row,
+                until_row: match self.planar.is_here() {
+                    true => self.schedule.fast_path.until_row,
+                    false => 0,
+                },
             };
             self.schedule.fast_path.end();
         }
@@ -384,17 +393,24 @@ impl Tracker<'_> {
     /// Place of a line against the reference, whose row lies `aside_px` to the left of the others.
     fn locate<R: Row>(
         &mut self,
-        row: usize,
+        place: usize,
         pixels: &mut R,
         aside_px: f32,
         sums: Sums,
     ) -> Result<Place, Rejected> {
+        let row = match self.store.is_planar() {
+            true => self.reference_row(place, pixels.pixels()),
+            false => Some(place),
+        };
+        let Some(row) = row else {
+            return Err(Rejected::NoTexture);
+        };
         let Some(&table) = self.store.table(row) else {
             return Err(Rejected::NoTexture);
         };
         if !table.has_texture() {
             if self.store.is_planar() {
-                let found = self.locate_down(row, &table, pixels, aside_px);
+                let found = self.locate_down([place, row], &table, pixels, aside_px);
                 if found != Err(Rejected::NoTexture) {
                     return found;
                 }
@@ -407,7 +423,7 @@ impl Tracker<'_> {
             return Err(Rejected::NoTexture);
         }
         let information_per_px2 = table.information_per_px2();
-        let expected = self.prediction.at(row) + aside_px;
+        let expected = self.prediction.at(place) + aside_px;
         let sums = if expected.abs() < self.correlator.here_px {
             sums.or_else(|| whole_sums(&self.store, row, pixels))
         } else {
@@ -434,7 +450,7 @@ impl Tracker<'_> {
         }
         let surprise = shift_px - expected;
         // After two inner products there is no time for it where it is but its turn; the next one will do.
-        let in_turn = row >= self.schedule.next_check
+        let in_turn = place >= self.schedule.next_check
             && (self.correlator.products < PRODUCTS_OF_A_CHECK
                 || !self.is_hurried()
                 || self.check.checks_every_line());
@@ -448,7 +464,7 @@ impl Tracker<'_> {
             if self.prediction.needs_more_than(information_per_px2) {
                 return Err(Rejected::NoTexture);
             }
-            let checked = self.check_and_follow(row, pixels.pixels(), shift_px);
+            let checked = self.check_and_follow([place, row], pixels.pixels(), shift_px);
             self.correlator.products = self.correlator.products.saturating_add(PRODUCTS_OF_A_CHECK);
             let Some(checked) = checked else {
                 return Err(Rejected::Occluded);
@@ -460,7 +476,7 @@ impl Tracker<'_> {
                 return Err(Rejected::Occluded);
             }
         }
-        if self.prediction.is_swift() && aside_px == 0.0 {
+        if self.prediction.is_swift() && aside_px == 0.0 && place == row {
             shift_px = self.unsmear(row, &table, pixels.pixels(), shift_px);
         }
         if self.store.is_planar() {
@@ -468,9 +484,9 @@ impl Tracker<'_> {
         }
         shift_px -= aside_px;
         if jumped {
-            self.prediction.jump(row, shift_px, information_per_px2);
+            self.prediction.jump(place, shift_px, information_per_px2);
         } else {
-            self.prediction.add(row, shift_px, information_per_px2);
+            self.prediction.add(place, shift_px, information_per_px2);
         }
         self.light.add_since(before);
         Ok(Place {
@@ -562,17 +578,22 @@ impl Tracker<'_> {
     #[cold]
     fn check_and_follow<P: Pixel>(
         &mut self,
-        row: usize,
+        [place, row]: [usize; 2],
         pixels: &[P],
         shift_px: f32,
     ) -> Option<f32> {
         let checked = self.check_line(row, pixels, shift_px);
-        self.after_check(row, pixels, checked);
+        self.after_check([place, row], pixels, checked);
         checked
     }
 
     /// `checked`: the shift of a line that was found to fit.
-    pub(super) fn after_check<P: Pixel>(&mut self, row: usize, pixels: &[P], checked: Option<f32>) {
+    pub(super) fn after_check<P: Pixel>(
+        &mut self,
+        [place, row]: [usize; 2],
+        pixels: &[P],
+        checked: Option<f32>,
+    ) {
         if let Some(shift_px) = checked
             && self.schedule.turn == row
         {
@@ -581,8 +602,8 @@ impl Tracker<'_> {
             self.store
                 .follow_row(row, pixels, place_px, self.light.to_reference, hurried);
         }
-        self.schedule.next_check = self.check.next_due(row, self.is_hurried());
-        if self.schedule.turn > row {
+        self.schedule.next_check = self.check.next_due(place, self.is_hurried());
+        if self.schedule.turn > place {
             self.schedule.next_check = self.schedule.next_check.min(self.schedule.turn);
         }
         self.schedule.background = self.store.is_busy() || self.check.is_searching();

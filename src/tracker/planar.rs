@@ -6,8 +6,8 @@
 //! solved one by one: what leads downwards is the mean of the second products of the last rows, by their information, and
 //! serves only for terms that are small.
 //!
-//! Terms of second order are each row's own, and so are those of third order along one axis. The others are small; a texture of no preferred direction answers to both shifts as if it were weakened by
-//! 1 − (b_x·x² + b_y·y²), b = curvature/6, along either axis (an isotropic spectrum's fourth moments: ⟨k_x⁴⟩ = 3⟨k_x²·k_y²⟩).
+//! Terms of second order are each row's own, and so are those of third order along one axis. The others are small; a
+//! texture of no preferred direction answers to both shifts as if it were weakened by 1 − (b_x·x² + b_y·y²), b = curvature/6, along either axis (an isotropic spectrum's fourth moments: ⟨k_x⁴⟩ = 3⟨k_x²·k_y²⟩).
 
 use super::{
     Place, Rejected, Tracker,
@@ -15,6 +15,7 @@ use super::{
     overlap::{Overlap, nearest_step},
     predict::Prediction,
     print,
+    residual::Residual,
     row::{Row, Summed},
     schedule::FastRows,
     vetting::UNLIT,
@@ -31,7 +32,18 @@ const KEEP: f32 = 0.75;
 /// A row's place is no surer from the rows before it than this, 1/px²: 0.03 px, as the picture moves on.
 const MOST_INFORMATION: f32 = 1e3;
 /// Beyond this the rows' expansions say nothing, px.
-const MOST_PX: f32 = 2.0;
+const MOST_PX: f32 = 1.0;
+/// A line further from its row of the reference than this, in steps from one row of its colour to the next, is read against
+/// the next one.
+const NEAR_STEPS: f32 = 0.6;
+/// A picture that moves along the columns by no more than this is expected in a frame where the one before ended, px.
+const SMALL_PX: f32 = 0.4;
+/// Else it is looked for by the first rows of a frame, so many steps either way.
+const SOUGHT_STEPS: usize = 4;
+const SOUGHT: usize = 2 * SOUGHT_STEPS + 1;
+const SEEKING_ROWS: u8 = 3;
+/// Columns that are compared then.
+const SOUGHT_COLUMNS: usize = 48;
 
 /// What measuring along both axes remembers.
 #[derive(Clone, Copy, Debug, Default)]
@@ -45,6 +57,15 @@ pub(super) struct Planar {
     pub(super) lean_px: f32,
     /// A sixth of the curvatures along x and y, 1/px².
     bend: [f32; 2],
+    /// By how many whole rows the picture lies below its reference; `down_px` and `near_px` come on top.
+    whole: i32,
+    /// The row of the reference that the present line is read against.
+    read_row: Option<usize>,
+    /// Furthest that it was along the columns of late, and in this frame, px.
+    range_px: [f32; 2],
+    /// What the first rows of this frame leave over at each place that is tried, and how many did.
+    sought: [f32; SOUGHT],
+    seeking: u8,
     /// Rows that take the fast path.
     pub(super) fast: FastRows,
     /// What the last line that was measured came to.
@@ -56,6 +77,34 @@ impl Planar {
     /// Where the present line is along the columns, px.
     pub(super) fn down_px(&self) -> f32 {
         self.near_px
+    }
+
+    /// The same with all whole rows, px.
+    pub(super) fn total_down_px(&self) -> f32 {
+        self.whole as f32 + self.down_px
+    }
+
+    /// The line is read against its own row.
+    pub(super) fn is_here(&self) -> bool {
+        self.whole == 0
+    }
+
+    /// The row of the reference that the present line is read against; `None` where it is not in the picture.
+    pub(super) fn read_row(&self) -> Option<usize> {
+        self.read_row
+    }
+
+    /// A frame begins; where the motion along the columns is large, its first rows look for the picture.
+    pub(super) fn begin_frame(&mut self) {
+        let [of_late, last] = self.range_px;
+        let keep = 0.95 * of_late;
+        self.range_px = [if last > keep { last } else { keep }, 0.0];
+        self.sought = [0.0; SOUGHT];
+        self.seeking = if self.range_px[0] > SMALL_PX {
+            SEEKING_ROWS
+        } else {
+            0
+        };
     }
 
     /// The rows have been built again: their `curvatures_per_px2` along x and y.
@@ -98,6 +147,24 @@ impl Planar {
         // What is no number is not near either.
         let near = self.near_px.abs() <= MOST_PX;
         self.down_px = if near { self.near_px } else { 0.0 };
+        let far = self.total_down_px().abs();
+        if far > self.range_px[1] {
+            self.range_px[1] = far;
+        }
+    }
+
+    /// The next line is read against the row that is nearest.
+    fn step(&mut self, stride: u8) {
+        let step = f32::from(stride);
+        let steps = if self.down_px > NEAR_STEPS * step {
+            1
+        } else if self.down_px < -NEAR_STEPS * step {
+            -1
+        } else {
+            return;
+        };
+        self.whole += steps * i32::from(stride);
+        self.down_px -= steps as f32 * step;
     }
 
     /// What both products of a line say. `upright_px`: what the first one read as if the line had moved along its row alone,
@@ -122,6 +189,57 @@ impl Planar {
 }
 
 impl Tracker<'_> {
+    /// The row of the reference that a line is read against, after it was looked for where that is needed; `None` where it is
+    /// not in the picture. Along the rows alone, it is the line's own.
+    pub(super) fn reference_row<P: Pixel>(&mut self, row: usize, pixels: &[P]) -> Option<usize> {
+        if self.planar.seeking > 0 {
+            self.seek(row, pixels);
+        }
+        let planar = &mut self.planar;
+        planar.near_px = planar.down_px;
+        let row = row.checked_add_signed(-(planar.whole as isize));
+        planar.read_row = row.filter(|&row| row < self.store.rows());
+        planar.read_row
+    }
+
+    /// Looks for a picture that moves by whole rows.
+    #[cold]
+    #[inline(never)]
+    fn seek<P: Pixel>(&mut self, row: usize, pixels: &[P]) {
+        let stride = i32::from(self.config.stride);
+        let shift_px = self.prediction.at(row);
+        let to_reference = self.light.to_reference;
+        let mut sought = self.planar.sought;
+        for (steps, left) in (-(SOUGHT_STEPS as i32)..).zip(&mut sought) {
+            let there = row.checked_add_signed(-(steps * stride) as isize);
+            let residual = there.and_then(|there| {
+                let (store, place_px) = (&self.store, [shift_px, 0.0]);
+                Residual::of::<false, P>(
+                    store,
+                    there,
+                    pixels,
+                    place_px,
+                    to_reference,
+                    SOUGHT_COLUMNS,
+                )
+            });
+            // A place that is not in the picture is none.
+            *left += residual.map_or(f32::MAX, |r| r.power.min(1e6));
+        }
+        let planar = &mut self.planar;
+        planar.sought = sought;
+        planar.seeking -= 1;
+        let middle = sought[SOUGHT_STEPS];
+        let least = (-(SOUGHT_STEPS as i32)..)
+            .zip(sought)
+            .min_by(|a, b| a.1.total_cmp(&b.1));
+        if let Some((steps, left)) = least {
+            let here = left >= middle;
+            planar.whole = if here { 0 } else { steps * stride };
+            (planar.down_px, planar.near_px, planar.information) = (0.0, 0.0, 0.0);
+        }
+    }
+
     /// A line of a row begins, which is expected at `shift_px` along it.
     pub(super) fn begin_planar<P: Pixel>(&mut self, row: usize, pixels: &[P], shift_px: f32) {
         let Some(table) = self.store.vertical_table(row) else {
@@ -168,11 +286,16 @@ impl Tracker<'_> {
             return Err(Rejected::NoTexture);
         }
         planar.accept(information);
+        let rows = planar.whole as f32;
         planar.first = Place {
-            shift_px: whole as f32 - aside_px + first,
+            shift_px: whole as f32 - aside_px + first + vertical.coupling * rows,
             information_per_px2: table.information_per_px2(),
         };
-        planar.vertical = vertical;
+        planar.vertical = Vertical {
+            shift_px: vertical.shift_px + rows,
+            ..vertical
+        };
+        planar.step(self.config.stride);
         self.planar = planar;
         Ok(whole as f32 + upright)
     }
@@ -190,10 +313,11 @@ impl Tracker<'_> {
     }
 
     /// Place of a line of a row whose edges all lie along it: it tells of the motion along the columns alone.
+    /// `place`: the line's own row; `row`: that of the reference.
     #[cold]
     pub(super) fn locate_down<R: Row>(
         &mut self,
-        row: usize,
+        [place, row]: [usize; 2],
         table: &RowTable,
         pixels: &mut R,
         aside_px: f32,
@@ -214,12 +338,12 @@ impl Tracker<'_> {
             self.light.to_reference = before;
             return Err(Rejected::Unlit);
         }
-        let shift_px = self.prediction.at(row) + aside_px;
+        let shift_px = self.prediction.at(place) + aside_px;
         self.begin_planar(row, pixels.pixels(), shift_px);
-        if row >= self.schedule.next_check || !self.light.may_have_been(before) {
+        if place >= self.schedule.next_check || !self.light.may_have_been(before) {
             let fits = self.fits(row, pixels.pixels(), shift_px);
             self.note_fit(fits);
-            self.after_check(row, pixels.pixels(), fits.then_some(shift_px));
+            self.after_check([place, row], pixels.pixels(), fits.then_some(shift_px));
             if !fits {
                 return Err(Rejected::Occluded);
             }
@@ -243,7 +367,9 @@ impl Tracker<'_> {
         pixels: &R,
         times: bool,
     ) -> Option<Place> {
-        let is_fast = self.planar.fast.has(line) && pixels.len() == usize::from(self.config.width);
+        let is_fast = self.planar.fast.has(line)
+            && self.planar.is_here()
+            && pixels.len() == usize::from(self.config.width);
         if !is_fast {
             return None;
         }
@@ -277,6 +403,7 @@ impl Tracker<'_> {
             return None;
         }
         planar.accept(information);
+        planar.step(self.config.stride);
         planar.vertical = vertical;
         planar.first = Place {
             shift_px,

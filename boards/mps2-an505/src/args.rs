@@ -15,6 +15,8 @@ pub struct Args<'a> {
     pub window_ms: u32,
     /// Instructions are counted (QEMU runs with `-icount shift=7`).
     pub icount: bool,
+    /// Motion is measured along rows and columns.
+    pub both_axes: bool,
     /// Path of the clip on the host: everything after `clip=`, spaces too.
     pub clip: &'a str,
 }
@@ -56,6 +58,7 @@ impl<'a> Args<'a> {
             fps_uhz: None,
             window_ms: 1000,
             icount: false,
+            both_axes: false,
             clip: clip.trim_end(),
         };
         for word in words.split_ascii_whitespace().skip(1) {
@@ -67,7 +70,8 @@ impl<'a> Args<'a> {
                 "exposure_ns" => args.exposure_ns = small?,
                 "fps_uhz" if number > 0 => args.fps_uhz = Some(number),
                 "window_ms" if number > 0 => args.window_ms = small?,
-                "fps_uhz" | "window_ms" => return Err(ArgsError::Value(word)),
+                "axes" if (1..=2).contains(&number) => args.both_axes = number == 2,
+                "axes" | "fps_uhz" | "window_ms" => return Err(ArgsError::Value(word)),
                 "icount" => args.icount = number != 0,
                 _ => return Err(ArgsError::Unknown(word)),
             }
@@ -83,11 +87,12 @@ mod tests {
 
     #[test]
     fn whole_command_line() {
-        let line = "fw line_time_ps=40000000 exposure_ns=500000 fps_uhz=59940060 icount=1 clip=/a b/motor.y4m";
+        let line = "fw line_time_ps=40000000 exposure_ns=500000 fps_uhz=59940060 icount=1 axes=2 clip=/a b/motor.y4m";
         let args = Args::parse(line).unwrap();
         assert_eq!(args.line_time_ps, 40_000_000);
         assert_eq!(args.fps_uhz, Some(59_940_060));
         assert_eq!((args.window_ms, args.icount), (1000, true));
+        assert!(args.both_axes);
         assert_eq!(args.clip, "/a b/motor.y4m");
     }
 
@@ -102,6 +107,10 @@ mod tests {
         assert_eq!(
             Args::parse("fw window_ms=0 clip=a"),
             Err(ArgsError::Value("window_ms=0"))
+        );
+        assert_eq!(
+            Args::parse("fw axes=3 clip=a"),
+            Err(ArgsError::Value("axes=3"))
         );
         assert_eq!(
             Args::parse("fw line_time_ps=5000000000 clip=a"),

@@ -8,7 +8,7 @@ use rowtone::pipeline::{LineSide, Reading, ReportSide};
 use rowtone::report::Report;
 use rowtone::spectrum;
 use rowtone::timeline::{BinnerError, Group};
-use rowtone::tracker::{self, StaticStorage};
+use rowtone::tracker::{self, Axes, StaticStorage, StaticVerticalStorage};
 use rowtone::wire::{Message, text};
 use rowtone_board::memory::{SpectrumMemory, rows_per_sample};
 use rowtone_mps2_an505::args::Args;
@@ -24,6 +24,9 @@ use static_cell::{ConstStaticCell, StaticCell};
 /// The RP2350 has room for a picture of 320 x 240; a narrower one may have more rows here.
 static LINES: ConstStaticCell<StaticStorage<{ 320 * 240 }, 480, MAX_WIDTH>> =
     ConstStaticCell::new(StaticStorage::new());
+/// What measuring along both axes needs besides.
+static VERTICAL: ConstStaticCell<StaticVerticalStorage<{ 320 * 240 }, 480, MAX_WIDTH>> =
+    ConstStaticCell::new(StaticVerticalStorage::new());
 static SPECTRUM: ConstStaticCell<SpectrumMemory> = ConstStaticCell::new(SpectrumMemory::new());
 static REPORTS: StaticCell<ReportSide<'static>> = StaticCell::new();
 
@@ -56,6 +59,11 @@ fn run(args: &Args, uart: &mut Uart) -> Result<(), Failure> {
     // Rounds end when this program says so.
     tracking.learn_frames = u16::MAX;
     tracking.columns_per_line = rowtone_board::memory::COLUMNS_PER_LINE;
+    let mut lent = LINES.take().lend();
+    if args.both_axes {
+        tracking.axes = Axes::Xy;
+        lent = lent.with_vertical(VERTICAL.take().lend());
+    }
     let config = spectrum::Config {
         window_ns,
         hop_ns: window_ns / 2,
@@ -66,7 +74,7 @@ fn run(args: &Args, uart: &mut Uart) -> Result<(), Failure> {
         uart,
         counter,
         lines,
-        side: LineSide::new(tracking, group, LINES.take().lend())?,
+        side: LineSide::new(tracking, group, lent)?,
         reports: reports(config, group)?,
         timing,
         per_line: Count::default(),

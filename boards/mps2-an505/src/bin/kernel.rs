@@ -33,6 +33,7 @@ mod on_the_board {
     static COEFFICIENTS: ConstStaticCell<Line<i8>> =
         ConstStaticCell::new(Line([0; LONGEST + STARTS]));
     static KEPT: ConstStaticCell<Kept> = ConstStaticCell::new(Kept([0; LONGEST_KEPT + STARTS]));
+    static OTHER: ConstStaticCell<Kept> = ConstStaticCell::new(Kept([0; LONGEST_KEPT + STARTS]));
     static PLAIN: ConstStaticCell<Kept> = ConstStaticCell::new(Kept([0; LONGEST_KEPT + STARTS]));
 
     #[entry]
@@ -45,6 +46,7 @@ mod on_the_board {
     fn run(uart: &mut Uart) -> Option<()> {
         let (Line(pixels), Line(coefficients)) = (PIXELS.take(), COEFFICIENTS.take());
         let (Kept(kept), Kept(plain)) = (KEPT.take(), PLAIN.take());
+        let Kept(other) = OTHER.take();
         let kernel = Kernel::detect();
         let mut cases = 0u32;
         for pattern in 0..5 {
@@ -91,6 +93,30 @@ mod on_the_board {
                             cases += 1;
                         }
                     }
+                    // Both products at once, of the row and of itself turned over.
+                    let half = kernel.with_half_the_light();
+                    let plain_sums = one_by_one(line, plain, 0, true);
+                    let both = half.kept_both_u8(line, row, row);
+                    same(
+                        uart,
+                        (pattern, n, p, h),
+                        both,
+                        (plain_sums, plain_sums.product),
+                    )?;
+                    let other = other.get_mut(h..h + n)?;
+                    other
+                        .iter_mut()
+                        .zip(plain.iter())
+                        .for_each(|(o, h)| *o = -h);
+                    same(uart, (pattern, n, p, h), kernel.keep(other), true)?;
+                    let both = half.kept_both_u8(line, row, other);
+                    same(
+                        uart,
+                        (pattern, n, p, h),
+                        both,
+                        (plain_sums, -plain_sums.product),
+                    )?;
+                    cases += 2;
                 }
             }
         }
@@ -109,6 +135,14 @@ mod on_the_board {
             let _ = writeln!(
                 uart,
                 "kernel: {n} px, {start} beyond a word: {instructions} instructions"
+            );
+            let second = other.get(..n)?;
+            let begin = counter.start();
+            core::hint::black_box(kernel.with_half_the_light().kept_both_u8(line, row, second));
+            let instructions = counter.instructions(begin) - nothing;
+            let _ = writeln!(
+                uart,
+                "kernel: {n} px, {start} beyond a word, both products: {instructions} instructions"
             );
         }
         Some(())
