@@ -26,6 +26,9 @@ read -r flash ram < <("$size" -A "$elf" | awk '
     END { print flash + 0, ram + 0 }')
 
 status=0
+# The core's memory starts as zeros: as initial values it would lie in flash once more.
+data=$("$size" -A "$elf" | awk '$1 == ".data" { print $2 }')
+[ "${data:-0}" -le 16384 ] || { echo "budget.sh: $name: $data bytes of initial values in flash; a static is not all zeros" >&2; status=1; }
 if "$nm" "$elf" | grep -qE '__rust_alloc|__rg_alloc|malloc'; then
     echo "budget.sh: $name: an allocator is linked" >&2
     status=1

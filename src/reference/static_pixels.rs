@@ -16,8 +16,9 @@ pub(super) const WATCHED: usize = 2;
 /// Pixels left out of a row, its own and those of the rows beside it that the filter across rows mixes with it.
 pub(super) const LEFT_OUT: usize = (2 * MAX_HALF + 1) * WATCHED;
 
-/// No pixel.
-pub(super) const NONE: u16 = u16::MAX;
+/// No pixel: the first of a row has no neighbour to tell its sharpness. (Zero, so that a static of it
+/// lies in `.bss`.)
+pub(super) const NONE: u16 = 0;
 
 /// A pixel that follows the motion by less than this share of what its sharpness asks for stands still.
 const FOLLOWS: f32 = 0.3;
