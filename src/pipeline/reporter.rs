@@ -90,6 +90,8 @@ impl<'a> Reporter<'a> {
             peaks: tones.peaks,
             um_per_px,
             line_time_us_fit: tones.line_time_us_fit,
+            noise_floor: tones.noise_floor,
+            other_px_rms: tones.other_px_rms,
         }
     }
 }

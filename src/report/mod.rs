@@ -66,6 +66,26 @@ pub struct Report {
     /// ([`Warning::TimingContradiction`]) and exactly one value fits. Wires of version 1 do not carry it.
     #[serde(skip)]
     pub line_time_us_fit: Option<f32>,
+    /// What is no tone, against frequency, along the rows: amplitude density from low to high. Wires of version 1 do not carry
+    /// it.
+    #[serde(skip)]
+    pub noise_floor: Vec<FloorPoint, MAX_FLOOR>,
+    /// Root mean square of the motion along the rows that is no tone, px: what the samples hold beyond tones and the quietest
+    /// part of the floor. 0 where the floor is white. Wires of version 1 do not carry it.
+    #[serde(skip)]
+    pub other_px_rms: f32,
+}
+
+/// Most points of a noise floor.
+pub const MAX_FLOOR: usize = 12;
+
+/// Noise of one level over a part of the band.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct FloorPoint {
+    /// The highest frequency of the part, Hz; it begins where the one before it ends.
+    pub to_hz: f32,
+    /// One-sided amplitude density, px/√Hz.
+    pub px_per_sqrt_hz: f32,
 }
 
 impl Report {
@@ -83,6 +103,8 @@ impl Report {
         um_per_px: None,
         velocity_mm_s_rms: None,
         line_time_us_fit: None,
+        noise_floor: Vec::new(),
+        other_px_rms: 0.0,
     };
 }
 

@@ -29,6 +29,10 @@ pub struct Motion {
     pub across_rad: Option<f32>,
     /// All rows move alike, as far as they tell.
     pub rigid: bool,
+    /// It was struck within the window, and its amplitude, which is that at the stroke, falls to 1/e in so long, s.
+    pub decay_s: Option<f32>,
+    /// How fast its frequency rises, Hz/s, where it changes within the window; the peak's is that in the window's middle.
+    pub hz_per_s: Option<f32>,
 }
 
 /// How a peak's motion runs over the rows.

@@ -189,6 +189,11 @@ impl<'a> Estimator<'a> {
             band,
             fps: l.fps,
             curvature: self.mark.curvature,
+            middle_s: {
+                let (start_ns, end_ns) = (self.mark.start_ns, self.mark.end_ns);
+                let middle_ns = start_ns.saturating_add(since(end_ns, start_ns) / 2);
+                since(middle_ns, l.zero_ns) as f32 * 1e-9
+            },
             since_begin_ns: since(l.zero_ns, self.mark.origin_ns),
         }
         .tones(

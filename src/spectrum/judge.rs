@@ -7,6 +7,7 @@ use super::alarm;
 use super::floor::{ALIKE, ALIKE_UNFITTED, Floor};
 use super::images::Images;
 use super::periodogram::Periodogram;
+use crate::report::{FloorPoint, MAX_FLOOR};
 
 /// Before a fit, what is less than so many times the floor is not tried.
 const WORTH_A_FIT: f32 = 7.5;
@@ -119,6 +120,41 @@ impl Noise {
         }
         let images = self.images.at(hz, p);
         images < segment.level || z > OVER_IMAGES * images
+    }
+
+    /// The floor from low to high frequency: amplitude densities, the square of which is z times `density`.
+    pub(crate) fn points(
+        &self,
+        highest_hz: f32,
+        density: f32,
+    ) -> heapless::Vec<FloorPoint, MAX_FLOOR> {
+        let point = |to_hz, level: f32| FloorPoint {
+            to_hz,
+            px_per_sqrt_hz: crate::math::sqrtf(level * density),
+        };
+        let mut points = heapless::Vec::new();
+        if self.is_white() {
+            let _ = points.push(point(highest_hz, self.white));
+            return points;
+        }
+        for s in &self.floor.segments {
+            let here = point(s.to_hz, s.level);
+            // The highest segments share the last point where there are more.
+            if points.push(here).is_err()
+                && let Some(last) = points.last_mut()
+            {
+                *last = here;
+            }
+        }
+        points
+    }
+
+    /// Root mean square of what the samples hold beyond the quietest part of the floor, px.
+    pub(crate) fn other_px_rms(&self) -> f32 {
+        if self.is_white() {
+            return 0.0;
+        }
+        crate::math::sqrtf((self.white - self.floor.quietest()).max(0.0))
     }
 
     /// What noise of the level at `hz` has there, and of how many cells that is known.

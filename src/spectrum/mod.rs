@@ -38,6 +38,7 @@ mod motion;
 mod notch;
 mod onset;
 mod order;
+mod outlier;
 mod periodogram;
 mod phase;
 mod plan;

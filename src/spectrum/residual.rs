@@ -58,6 +58,12 @@ impl<'g> Residual<'g> {
         }
     }
 
+    /// Leaves samples out that are far off all others.
+    pub(crate) fn leave_outliers_out(&mut self, samples: &mut Samples<'_>, model: &Model) {
+        super::outlier::leave_out(samples, model, self.grid);
+        self.forget();
+    }
+
     /// Another model is looked at: what is known is of no use.
     pub(crate) fn forget(&mut self) {
         self.places = None;

@@ -106,6 +106,9 @@ impl Search {
         residual: &mut Residual<'_>,
     ) -> Outcome {
         fit.passes = 0;
+        *model = Model::new(drift_powers(samples));
+        fit.refine(samples, model, 2);
+        residual.leave_outliers_out(samples, model);
         // Where tones explain all but white noise, no floor is asked for.
         let mut outcome = self.search(samples, fit, model, residual);
         residual.look_all(samples, model);

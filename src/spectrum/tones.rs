@@ -14,7 +14,7 @@ use super::smear::Smear;
 use super::timebase::Look;
 use super::tone::Tone;
 use crate::math::sqrtf;
-use crate::report::{MAX_PEAKS, MAX_SHAPES, Motion, Peak, PeakShape};
+use crate::report::{FloorPoint, MAX_FLOOR, MAX_PEAKS, MAX_SHAPES, Motion, Peak, PeakShape};
 use crate::timeline::{Curvature, Group};
 
 /// Below this share of an amplitude left by exposure and averaging, a tone is not reported: its amplitude would
@@ -52,6 +52,10 @@ pub struct Tones {
     pub timing_contradiction: bool,
     /// What the line time must be if the frame rate is right, µs, where one value fits.
     pub line_time_us_fit: Option<f32>,
+    /// What is no tone, against frequency, along x.
+    pub noise_floor: heapless::Vec<FloorPoint, MAX_FLOOR>,
+    /// Root mean square of the motion that is no tone, px.
+    pub other_px_rms: f32,
     /// Frame rate, Hz; 0 with less than two frames.
     pub fps: f32,
     /// Standard deviation of a sample of average weight, px.
@@ -78,6 +82,8 @@ pub(crate) struct Telling<'a> {
     pub(crate) band: Band,
     pub(crate) fps: f32,
     pub(crate) curvature: Curvature,
+    /// From the time that is 0 in the fit to the middle of the window, s.
+    pub(crate) middle_s: f32,
     /// From the recording's beginning to the time that is 0 in the fit, ns.
     pub(crate) since_begin_ns: i64,
 }
@@ -127,6 +133,10 @@ impl Telling<'_> {
         let mut list = List::new();
         shapes.clear();
         residual.look_all(samples, model);
+        // z is half the power over the window's cells: a one-sided density is 2z·T/N.
+        let density = 2.0 * samples.length_s / samples.total_weight.max(1.0);
+        tones.noise_floor = residual.noise(0).points(self.band.highest_hz, density);
+        tones.other_px_rms = residual.noise(0).other_px_rms();
         self.tell(samples, fit, (model, residual), &smear, (&mut list, shapes));
         if model.has_notches() {
             let mut strong = model.without_notches();
@@ -235,6 +245,9 @@ impl Telling<'_> {
                 continue;
             }
             let slope = tone.chirp / (samples.length_s * samples.length_s);
+            // In the middle of the window; the fit knows it in the middle of its samples.
+            let mut peak = peak;
+            peak.hz += slope * self.middle_s;
             let _ = list.push((peak, slope));
             if !told.rigid {
                 let _ = shapes.push(over_rows(
@@ -357,6 +370,11 @@ impl Telling<'_> {
             phase_rad: phase(0),
             y_phase_rad: of(1, size(1)).map(|_| phase(1)),
             across_rad: lean.map(|[x, y]| libm::atan2f(y, x)),
+            decay_s: tone
+                .onset
+                .map(|_| samples.length_s / (-tone.growth).max(1e-6)),
+            hz_per_s: (tone.modulated && tone.onset.is_none())
+                .then(|| tone.chirp / (samples.length_s * samples.length_s)),
             rigid: told.rigid,
         }
     }

@@ -45,6 +45,8 @@ prop_compose! {
             peaks: peaks.into_iter().collect(),
             warnings: Warnings::from(warnings), um_per_px, velocity_mm_s_rms,
             line_time_us_fit: None,
+        noise_floor: Default::default(),
+        other_px_rms: 0.0,
         }
     }
 }
@@ -115,6 +117,8 @@ pub fn ordinary_report(seq: u32) -> Report {
         um_per_px: Some(50.0),
         velocity_mm_s_rms: Some(4.4512),
         line_time_us_fit: None,
+        noise_floor: Default::default(),
+        other_px_rms: 0.0,
     }
 }
 

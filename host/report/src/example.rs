@@ -30,5 +30,7 @@ pub fn example(um_per_px: Option<f32>) -> Report {
         um_per_px,
         velocity_mm_s_rms: None,
         line_time_us_fit: None,
+        noise_floor: Default::default(),
+        other_px_rms: 0.0,
     }
 }

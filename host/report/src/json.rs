@@ -24,6 +24,10 @@ struct ReportObject {
     peaks: Vec<PeakObject>,
     #[serde(skip_serializing_if = "Option::is_none")]
     timing: Option<TimingObject>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    noise_floor: Option<Vec<[f32; 2]>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    other_px_rms: Option<f32>,
     warnings: Vec<&'static str>,
 }
 
@@ -60,6 +64,10 @@ struct MotionObject {
     #[serde(skip_serializing_if = "Option::is_none")]
     across_rad: Option<f32>,
     rigid: bool,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    decay_s: Option<f32>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    hz_per_s: Option<f32>,
 }
 
 impl MotionObject {
@@ -73,6 +81,8 @@ impl MotionObject {
             y_phase_rad: motion.y_phase_rad,
             across_rad: motion.across_rad,
             rigid: motion.rigid,
+            decay_s: motion.decay_s,
+            hz_per_s: motion.hz_per_s,
         }
     }
 }
@@ -186,6 +196,11 @@ fn to_string(
             .iter()
             .map(|peak| PeakObject::new(peak, report.um_per_px, shapes))
             .collect(),
+        noise_floor: timing.is_some().then(|| {
+            let points = report.noise_floor.iter();
+            points.map(|p| [p.to_hz, p.px_per_sqrt_hz]).collect()
+        }),
+        other_px_rms: timing.as_ref().map(|_| report.other_px_rms),
         timing,
         warnings: report.warnings.names().collect(),
     };
@@ -197,7 +212,7 @@ fn to_string(
 mod tests {
     use super::Place;
     use crate::example;
-    use rowtone::report::{Motion, PeakShape, ShapeRow};
+    use rowtone::report::{FloorPoint, Motion, PeakShape, ShapeRow};
 
     #[test]
     fn the_keys_are_the_contract() {
@@ -226,6 +241,8 @@ mod tests {
             y_phase_rad: None,
             across_rad: None,
             rigid: false,
+            decay_s: None,
+            hz_per_s: None,
         });
         let row = ShapeRow {
             row: 7,
@@ -248,7 +265,7 @@ mod tests {
                 r#""x_px":0.3998,"x_px_sd":0.0002,"y_px":null,"y_px_sd":null,"phase_rad":0.31,"#,
                 r#""y_phase_rad":null,"rigid":false,"shape":[{"row":7,"x_px":0.25,"#,
                 r#""x_phase_rad":-1.5,"y_px":null,"y_phase_rad":null}]}],"#,
-                r#""timing":{"line_time_us_fit":null}"#
+                r#""timing":{"line_time_us_fit":null},"noise_floor":[[400.0,0.001]],"other_px_rms":0.0"#
             )),
             "{text}"
         );

@@ -209,6 +209,8 @@ pub fn decode_report(register: impl Fn(u16) -> Option<u16>) -> Option<Report> {
         um_per_px: (flags & 2 != 0).then_some(real(34)?),
         peaks,
         line_time_us_fit: None,
+        noise_floor: Default::default(),
+        other_px_rms: 0.0,
     };
     crate::wire::check_report(&report).ok().map(|()| report)
 }

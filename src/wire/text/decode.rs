@@ -169,6 +169,8 @@ fn read_report(mut fields: Fields<'_>) -> Result<Message, DecodeError> {
         velocity_mm_s_rms: fields.optional_real("velocity_mm_s_rms", resolution::MM_S)?,
         peaks: Vec::new(),
         line_time_us_fit: None,
+        noise_floor: Default::default(),
+        other_px_rms: 0.0,
     };
     let count: u32 = fields.integer("peaks")?;
     for _ in 0..count {

@@ -92,6 +92,8 @@ pub struct Scene {
     pub hz: Option<f64>,
     /// The tone's amplitude, px.
     pub amplitude_px: f64,
+    /// How fast it rises, Hz/s, and when it is at `hz`, s.
+    rise: (f64, f64),
 }
 
 /// A noise of even density: so many sinusoids that a window cannot tell them from it.
@@ -178,6 +180,7 @@ impl Scene {
             window_s: kind.window_s,
             hz: None,
             amplitude_px: 0.0,
+            rise: (0.0, 0.0),
         };
         let random = kind
             .random
@@ -231,6 +234,7 @@ impl Scene {
             }
             Motion::RunUp { px, hz_per_s } => {
                 self.amplitude_px = px;
+                self.rise = (hz_per_s, middle);
                 Box::new(move |t| {
                     let t = t - middle;
                     px * (TAU * (hz + 0.5 * hz_per_s * t) * t + phase).cos()
@@ -327,14 +331,15 @@ impl Outcome {
     fn add(&mut self, number: u64, scene: &Scene, report: &Report) {
         self.windows += 1;
         let sure: Vec<&Peak> = report.peaks.iter().filter(|p| !p.ambiguous).collect();
+        let middle_s = report.time_ms as f64 * 1e-3 - 0.5 * f64::from(report.window_s);
+        let (hz_per_s, at_s) = scene.rise;
+        let true_hz = scene.hz.map(|hz| hz + hz_per_s * (middle_s - at_s));
         let near = |p: &&Peak| {
-            let off = scene
-                .hz
-                .map_or(f64::INFINITY, |hz| (f64::from(p.hz) - hz).abs());
+            let off = true_hz.map_or(f64::INFINITY, |hz| (f64::from(p.hz) - hz).abs());
             off < (0.5 / scene.window_s).max(5.0 * f64::from(p.hz_sd))
         };
         let found = report.peaks.iter().find(near);
-        if let (Some(p), Some(hz)) = (found, scene.hz) {
+        if let (Some(p), Some(hz)) = (found, true_hz) {
             self.found += 1;
             let off = f64::from(p.hz) - hz;
             let amplitude = f64::from(p.amplitude_px) - scene.amplitude_px;
