@@ -215,6 +215,7 @@ struct Outlets {
 impl Outlets {
     fn hear(&mut self, event: Event<'_>) -> Result<(), Failure> {
         match event {
+            Event::Part(part) => self.place.roi = [part.x, part.y, part.width, part.height],
             Event::Frame(start_ns) => {
                 self.progress.step();
                 if let Some(picture) = &mut self.picture {

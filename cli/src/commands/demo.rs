@@ -91,6 +91,7 @@ pub fn run(_args: &Args) -> Result<(), Failure> {
     let progress = Progress::new(Some(u64::from(SECONDS * 60)));
     analysis.run(|event| {
         match event {
+            Event::Part(_) => {}
             Event::Frame(_) => progress.step(),
             Event::Sample(_) => {}
             Event::Report(report, _) => progress.aside(|| show(report, &mut out))?,

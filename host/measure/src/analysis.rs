@@ -12,7 +12,8 @@ use rowtone::tracker::Axes;
 
 use crate::memory::SpectrumMemory;
 use crate::tracking::{FrameShifts, Shifts};
-use rowtone_clip::Camera;
+use crate::wander::Wander;
+use rowtone_clip::{Camera, Rect};
 use rowtone_failure::Failure;
 
 /// Highest frequency that is looked for when none is given, Hz: beyond what machines do as a rule, and
@@ -134,6 +135,8 @@ impl Plan {
 /// What an analysis has to say.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Event<'a> {
+    /// This part of the picture as it was given is measured; before the first frame.
+    Part(Rect),
     /// A frame has been taken in; it started at this time, ns.
     Frame(i64),
     /// Some rows of it, combined.
@@ -147,6 +150,10 @@ pub enum Event<'a> {
 pub struct Analysis<'a> {
     shifts: Shifts,
     reports: ReportSide<'a>,
+    /// The first frames showed that all of the picture shakes.
+    camera_moves: bool,
+    /// Where the picture was on average, frame by frame.
+    wander: Wander,
     /// Frames without samples.
     silence: Silence,
 }
@@ -166,6 +173,8 @@ impl<'a> Analysis<'a> {
         Ok(Self {
             shifts,
             reports,
+            camera_moves: false,
+            wander: Wander::new(plan.config.window_ns),
             silence: Silence::new(plan.config.window_ns, plan.config.hop_ns),
         })
     }
@@ -210,6 +219,10 @@ impl<'a> Analysis<'a> {
         frame: &FrameShifts,
         on: &mut impl FnMut(Event<'_>) -> Result<(), Failure>,
     ) -> Result<(), Failure> {
+        if let Some(chosen) = frame.chosen {
+            self.camera_moves = chosen.camera_moves;
+            on(Event::Part(chosen.part))?;
+        }
         on(Event::Frame(frame.start_ns))?;
         let mut tally = Tally::NONE;
         let mut silent = true;
@@ -217,6 +230,7 @@ impl<'a> Analysis<'a> {
             tally.add(&reading.tally);
             silent &= reading.sample.is_none();
         }
+        self.wander.note_frame(frame.start_ns, &frame.readings);
         let fps = self.shifts.camera.fps as f32;
         if let Some(report) = self.silence.note_frame(frame.start_ns, silent, fps, &tally)
             // Nothing could ever be measured, which is no report but a refusal.
@@ -252,6 +266,8 @@ impl<'a> Analysis<'a> {
         self.silence.number(&mut report);
         // What the recording as a whole warns of.
         report.warnings = report.warnings.union(self.shifts.camera.warnings);
+        let moves = self.camera_moves || self.wander.exceeds(&report);
+        report.warnings.insert_if(moves, Warning::CameraMoves);
         let mut shapes = self.reports.shapes().to_vec();
         for row in shapes.iter_mut().flat_map(|s| &mut s.rows) {
             row.row = row.row.saturating_add(self.shifts.part.y as u16);

@@ -8,3 +8,4 @@ pub mod analysis;
 pub mod memory;
 pub mod restore;
 pub mod tracking;
+mod wander;

@@ -98,7 +98,7 @@ pub fn measure(case: &Case) -> Result<Figures, SimError> {
     let (cols, rows) = (case.config.sensor.cols, case.config.sensor.rows);
     let frames: Vec<Filmed> = camera.frames().map(Filmed).collect();
     let part = rowtone_clip::Rect::whole(cols as usize, rows as usize);
-    let region = choose(&frames, &part, &camera.timing());
+    let region = choose(&frames, &part, &camera.timing()).region;
     let (mut all, mut chosen) = ([0.0; 2], [0.0; 2]);
     for row in 0..rows {
         let moving = case.config.moving_cols(row).unwrap_or(0..0);

@@ -5,8 +5,8 @@ use std::thread;
 
 use rowtone::timeline::{Displacement, Group};
 
-use super::region::{self, Region};
-use super::{Ending, Engine, FrameShifts, Wanted, background};
+use super::region::{self, Choice, Region};
+use super::{Chosen, Ending, Engine, FrameShifts, Wanted, background};
 use crate::memory::TrackerMemory;
 use rowtone_clip::ring::Outlet;
 use rowtone_clip::{Camera, Feed, Frame, Rect};
@@ -57,10 +57,16 @@ fn measure_all(
         &mut memory,
         still_memory.as_mut(),
     )?;
-    let region = lines.learn_roughly_and_choose(&feed.camera, &kept, &part);
+    let choice = lines.learn_roughly_and_choose(&feed.camera, &kept, &part);
+    let region = choice.region;
+    lines.chosen = Some(Chosen {
+        part: as_given(&region, &feed.camera),
+        camera_moves: choice.camera_moves,
+    });
     let mut notes = std::mem::take(&mut feed.notes);
     if region != whole {
         notes.push(told(&region, &feed.camera));
+        let chosen = lines.chosen;
         lines = Lines::new(
             feed,
             part,
@@ -69,6 +75,7 @@ fn measure_all(
             &mut memory,
             still_memory.as_mut(),
         )?;
+        lines.chosen = chosen;
         lines.learn_roughly(&kept);
     }
     lines.learn(&kept, 1);
@@ -79,8 +86,8 @@ fn measure_all(
     lines.run(feed, kept, more, note, to)
 }
 
-/// What `--roi auto` chose.
-fn told(region: &Region, camera: &Camera) -> String {
+/// A region as the user gives it: in the picture as it was.
+fn as_given(region: &Region, camera: &Camera) -> Rect {
     let Region { columns, rows } = region;
     let part = Rect {
         x: columns.start,
@@ -88,9 +95,13 @@ fn told(region: &Region, camera: &Camera) -> String {
         width: columns.len(),
         height: rows.len(),
     };
-    // As the user gives it: in the picture as it was.
     let (width, height) = camera.size;
-    let part = camera.turn.back().part(part, width, height);
+    camera.turn.back().part(part, width, height)
+}
+
+/// What `--roi auto` chose.
+fn told(region: &Region, camera: &Camera) -> String {
+    let part = as_given(region, camera);
     format!(
         "--roi auto measures {},{},{},{}: the rest does not move with it (--roi full for all of it)",
         part.x, part.y, part.width, part.height
@@ -122,6 +133,8 @@ struct Lines<'a> {
     combines: bool,
     /// That stripes were mistaken was told.
     slips_told: bool,
+    /// What is measured, until the first frame takes it along.
+    chosen: Option<Chosen>,
 }
 
 /// What is told when stripes were mistaken.
@@ -161,15 +174,19 @@ impl<'a> Lines<'a> {
             still_rows: Vec::new(),
             combines: groups.is_some(),
             slips_told: false,
+            chosen: None,
         })
     }
 
     /// The first round of learning, and which part of `part` vibrates, where that is asked for: chosen on another thread
     /// while this one learns all of it, for mostly that is what is chosen.
-    fn learn_roughly_and_choose(&mut self, camera: &Camera, kept: &[Frame], part: &Rect) -> Region {
+    fn learn_roughly_and_choose(&mut self, camera: &Camera, kept: &[Frame], part: &Rect) -> Choice {
         if camera.part.is_some() {
             self.learn_roughly(kept);
-            return Region::whole(part);
+            return Choice {
+                region: Region::whole(part),
+                camera_moves: false,
+            };
         }
         thread::scope(|scope| {
             let choice = scope.spawn(|| region::choose(kept, part, &camera.timing));
@@ -239,6 +256,7 @@ impl<'a> Lines<'a> {
         shifts.number = frame.number;
         shifts.start_ns = frame.start_ns;
         shifts.note = note;
+        shifts.chosen = self.chosen.take();
         shifts.rows.clear();
         shifts.readings.clear();
         let (rows, readings) = (&mut shifts.rows, &mut shifts.readings);

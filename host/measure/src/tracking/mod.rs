@@ -45,8 +45,19 @@ pub struct FrameShifts {
     pub rows: Vec<Displacement>,
     /// The rows combined, where that was asked for, and what became of the frame's rows.
     pub readings: Vec<Reading>,
+    /// With the first frame: what is measured.
+    pub chosen: Option<Chosen>,
     /// Something to tell the user at once, a line each.
     note: Option<String>,
+}
+
+/// What is measured of the picture, and what was seen on the way to it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Chosen {
+    /// The part, in the picture as it was given.
+    pub part: Rect,
+    /// All of the picture shakes by more than a part of it vibrates.
+    pub camera_moves: bool,
 }
 
 /// How the lines ended, with the warning that the user is told in the end.

@@ -45,6 +45,15 @@ impl Region {
     }
 }
 
+/// What the first frames say of the picture.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Choice {
+    /// The part to measure.
+    pub region: Region,
+    /// All of the picture shakes by more than a part of it vibrates.
+    pub camera_moves: bool,
+}
+
 /// A frame, as far as it is needed here.
 pub trait Picture {
     /// Start of exposure of its first row, ns.
@@ -65,8 +74,11 @@ impl Picture for Frame {
 
 /// The part of `part` that vibrates, by the first frames. The whole part where all of it does, nothing does, or it
 /// cannot be told. `timing` is the whole picture's.
-pub fn choose<P: Picture>(frames: &[P], part: &Rect, timing: &Timing) -> Region {
-    let whole = Region::whole(part);
+pub fn choose<P: Picture>(frames: &[P], part: &Rect, timing: &Timing) -> Choice {
+    let whole = Choice {
+        region: Region::whole(part),
+        camera_moves: false,
+    };
     if frames.len() < LEAST_FRAMES {
         return whole;
     }
@@ -83,17 +95,34 @@ pub fn choose<P: Picture>(frames: &[P], part: &Rect, timing: &Timing) -> Region 
         known.push(tone);
         tones.push(tones::take_out(&mut shifts, tone.hz, &bands));
     }
-    let Some(found) = rectangle::best(&tones, shifts.columns.len(), bands.len()) else {
-        return whole;
+    let (across, down) = (shifts.columns.len(), bands.len());
+    // A shake may be much stronger than what vibrates.
+    let mut all = tones.clone();
+    while !known.is_empty()
+        && all.len() < TONES
+        && let Some(tone) = tones::weaker(&shifts, &known)
+    {
+        known.push(tone);
+        all.push(tones::take_out(&mut shifts, tone.hz, &bands));
+    }
+    let camera_moves = rectangle::camera_moves(&all, across, down);
+    let Some(found) = rectangle::best_of_motions(tones, across, down) else {
+        return Choice {
+            camera_moves,
+            ..whole
+        };
     };
     let span = |pieces: &[Range<usize>], found: &Range<usize>| {
         pieces[found.start].start..pieces[found.end - 1].end
     };
     let columns = span(&shifts.columns, &found.columns);
     let rows = span(&shifts.groups, &span(&bands, &found.rows));
-    Region {
-        columns: part.x + columns.start..part.x + columns.end,
-        rows: part.y + rows.start..part.y + rows.end,
+    Choice {
+        region: Region {
+            columns: part.x + columns.start..part.x + columns.end,
+            rows: part.y + rows.start..part.y + rows.end,
+        },
+        camera_moves,
     }
 }
 

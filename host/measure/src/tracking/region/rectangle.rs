@@ -14,6 +14,11 @@ const STILL_OF_LARGE: f64 = 0.3;
 /// What knows less of the tone than this share of the whole picture is no part to measure: a lamp's flicker on pixels that
 /// are nearly white, something that passes.
 const LEAST: f64 = 0.08;
+/// Tiles of a part that moves follow the tone alike: their amplitudes vary by less than this share of their mean, squared. Of a
+/// motion along the columns, which each tile takes for some motion along the rows by how its edges lean, they vary by more.
+const UNLIKE: f64 = 0.25;
+/// Of a camera that moves all tiles follow better than that.
+const ALIKE: f64 = 0.05;
 /// This many standard deviations of the amplitude are in its favour.
 const SURE: f64 = 4.0;
 
@@ -81,6 +86,72 @@ impl Tile {
         let share = if px > LARGE_PX { STILL_OF_LARGE } else { STILL };
         c * x + s * y + SURE * sd < share * px
     }
+}
+
+/// By how much tiles differ in how they follow a tone, beyond their noise: the variance of their amplitudes, weighted, over the
+/// square of their mean. Infinite where they do not follow it at all.
+fn unlikeness(tiles: &[Tile], columns: usize, of: &Rectangle) -> f64 {
+    let (mut all, mut own, mut n) = (Tile::default(), 0.0, 0.0);
+    for y in of.rows.clone() {
+        for x in of.columns.clone() {
+            let tile = tiles[y * columns + x];
+            if tile.amplitude().is_some() {
+                all += tile;
+                own += tile.outstanding();
+                n += 1.0;
+            }
+        }
+    }
+    let mean = all.outstanding();
+    // Two degrees of freedom each but for the mean.
+    let excess = own - mean - 2.0 * (n - 1.0);
+    if mean > 0.0 {
+        excess.max(0.0) / mean
+    } else {
+        f64::INFINITY
+    }
+}
+
+/// The rectangle of [`best`], by the tones that are motions along the rows; what leaks in from a motion along the
+/// columns is no reason to leave anything out.
+pub(super) fn best_of_motions(
+    mut tones: Vec<Vec<Tile>>,
+    columns: usize,
+    rows: usize,
+) -> Option<Rectangle> {
+    loop {
+        let found = best(&tones, columns, rows)?;
+        let before = tones.len();
+        tones.retain(|tone| unlikeness(tone, columns, &found) < UNLIKE);
+        if tones.len() == before {
+            return Some(found);
+        }
+    }
+}
+
+/// The camera moves: the first tone, the largest, is in all tiles alike, and another one in a part of them alone.
+pub(super) fn camera_moves(tones: &[Vec<Tile>], columns: usize, rows: usize) -> bool {
+    let Some((shake, others)) = tones.split_first() else {
+        return false;
+    };
+    let whole = Rectangle {
+        columns: 0..columns,
+        rows: 0..rows,
+    };
+    let amplitude = |tone: &[Tile], of: &Rectangle| {
+        let mut all = Tile::default();
+        for y in of.rows.clone() {
+            of.columns
+                .clone()
+                .for_each(|x| all += tone[y * columns + x]);
+        }
+        all.amplitude().map_or(0.0, |[c, s]| c.hypot(s))
+    };
+    unlikeness(shake, columns, &whole) < ALIKE
+        && others.iter().any(|tone| {
+            let part = best_of_motions(vec![tone.clone()], columns, rows);
+            part.is_some_and(|part| amplitude(tone, &part) < amplitude(shake, &whole))
+        })
 }
 
 /// Columns and rows, in tiles.
@@ -263,6 +334,45 @@ mod tests {
         let also_left = |x, _| if is_left(x) { [0.0, 0.01] } else { [0.0; 2] };
         let both = [tiles(0.03, left), tiles(0.03, also_left)];
         assert_eq!(chosen(&both), Some((0..6, 0..10)));
+    }
+
+    #[test]
+    fn what_leaks_from_a_motion_along_the_columns_is_no_part_to_measure() {
+        // Edges lean either way, more so on the left.
+        let leak = |x: usize, y: usize| {
+            let lean = ((x * 7 + y * 5) % 11) as f64 / 5.0 - 1.0;
+            let more = if is_left(x) {
+                0.05 + 0.1 * lean
+            } else {
+                0.02 * lean
+            };
+            [more, 0.3 * more]
+        };
+        let leaking = vec![tiles(0.005, leak)];
+        assert!(best(&leaking, COLUMNS, ROWS).is_some());
+        assert_eq!(best_of_motions(leaking.clone(), COLUMNS, ROWS), None);
+        // A motion along the rows of a part is still one beside it.
+        let third = |x, _| if is_left(x) { [0.1, 0.0] } else { [0.0; 2] };
+        let both = vec![tiles(0.005, third), leaking[0].clone()];
+        let found = best_of_motions(both, COLUMNS, ROWS).unwrap();
+        assert_eq!((found.columns, found.rows), (0..6, 0..10));
+    }
+
+    #[test]
+    fn a_camera_moves_where_all_follow_one_tone_and_a_part_another() {
+        let shake = tiles(0.01, |_, _| [0.3, 0.1]);
+        let machine = |px: f64| {
+            tiles(
+                0.01,
+                move |x, _| if is_left(x) { [0.0, px] } else { [0.0; 2] },
+            )
+        };
+        assert!(camera_moves(&[shake.clone(), machine(0.05)], COLUMNS, ROWS));
+        assert!(!camera_moves(&[shake.clone()], COLUMNS, ROWS));
+        // All of the machine is in the picture.
+        let all = tiles(0.01, |_, _| [0.0, 0.05]);
+        assert!(!camera_moves(&[shake.clone(), all], COLUMNS, ROWS));
+        assert!(!camera_moves(&[machine(0.3), shake], COLUMNS, ROWS));
     }
 
     #[test]

@@ -65,6 +65,15 @@ pub(super) struct Tone {
 /// taking a tone out of it leaves something at all multiples of the frame rate from it. The others are of about the same
 /// strength.
 pub(super) fn strongest(shifts: &Shifts, known: &[Tone]) -> Option<Tone> {
+    outstanding(shifts, known, ALIKE)
+}
+
+/// The same, however much weaker than those known.
+pub(super) fn weaker(shifts: &Shifts, known: &[Tone]) -> Option<Tone> {
+    outstanding(shifts, known, 0.0)
+}
+
+fn outstanding(shifts: &Shifts, known: &[Tone], share: f64) -> Option<Tone> {
     let mut pooled: Vec<f64> = Vec::new();
     let mut strips = 0.0f64;
     for (strip, power) in spectra(shifts).into_iter().enumerate() {
@@ -94,7 +103,7 @@ pub(super) fn strongest(shifts: &Shifts, known: &[Tone]) -> Option<Tone> {
     };
     let inner = (1..pooled.len().saturating_sub(1)).filter(|&bin| !is_ghost(bin));
     let best = inner.max_by(|&a, &b| pooled[a].total_cmp(&pooled[b]))?;
-    let least = known.first().map_or(0.0, |k| ALIKE * k.power);
+    let least = known.first().map_or(0.0, |k| share * k.power);
     if pooled[best] < threshold.max(least) {
         return None;
     }
