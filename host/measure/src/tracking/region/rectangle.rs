@@ -19,6 +19,8 @@ const LEAST: f64 = 0.08;
 const UNLIKE: f64 = 0.25;
 /// Of a camera that moves all tiles follow better than that.
 const ALIKE: f64 = 0.05;
+/// What is weaker than this share of a shake may be what taking the shake out has left.
+const LEAST_SHARE: f64 = 0.1;
 /// This many standard deviations of the amplitude are in its favour.
 const SURE: f64 = 4.0;
 
@@ -150,7 +152,10 @@ pub(super) fn camera_moves(tones: &[Vec<Tile>], columns: usize, rows: usize) -> 
     unlikeness(shake, columns, &whole) < ALIKE
         && others.iter().any(|tone| {
             let part = best_of_motions(vec![tone.clone()], columns, rows);
-            part.is_some_and(|part| amplitude(tone, &part) < amplitude(shake, &whole))
+            part.is_some_and(|part| {
+                let share = amplitude(tone, &part) / amplitude(shake, &whole);
+                (LEAST_SHARE..1.0).contains(&share)
+            })
         })
 }
 
