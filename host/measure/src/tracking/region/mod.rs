@@ -105,7 +105,7 @@ pub fn choose<P: Picture>(frames: &[P], part: &Rect, timing: &Timing) -> Choice 
         known.push(tone);
         all.push(tones::take_out(&mut shifts, tone.hz, &bands));
     }
-    let camera_moves = rectangle::camera_moves(&all, across, down);
+    let camera_moves = is_regular(&shifts.starts_s) && rectangle::camera_moves(&all, across, down);
     let Some(found) = rectangle::best_of_motions(tones, across, down) else {
         return Choice {
             camera_moves,
@@ -124,6 +124,13 @@ pub fn choose<P: Picture>(frames: &[P], part: &Rect, timing: &Timing) -> Choice 
         },
         camera_moves,
     }
+}
+
+/// No frame is missing: where one is, taking a tone out leaves more of it, which may look like another.
+fn is_regular(starts_s: &[f64]) -> bool {
+    let steps = || starts_s.windows(2).map(|pair| pair[1] - pair[0]);
+    let (least, most) = steps().fold((f64::INFINITY, 0.0f64), |(a, b), s| (a.min(s), b.max(s)));
+    most < 1.25 * least
 }
 
 /// Up to `most` pieces of about equal length, none shorter than `least`.
