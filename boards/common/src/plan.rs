@@ -57,18 +57,11 @@ impl Plan {
     }
 }
 
-/// The settings that concern the spectrum.
+/// The settings that concern the spectrum, with as many passes as a hop has time for.
 pub fn spectrum_config(settings: &Settings) -> spectrum::Config {
-    let ns = |s: f32| (s * 1e9) as i64;
     spectrum::Config {
-        window_ns: ns(settings.window_s),
-        hop_ns: ns(settings.hop_s),
-        min_hz: settings.min_hz,
-        max_hz: settings.max_hz,
-        max_peaks: settings.max_peaks.into(),
-        false_alarm: settings.false_alarm,
         max_passes: MAX_PASSES,
-        um_per_px: settings.um_per_px,
+        ..settings.spectrum()
     }
 }
 

@@ -115,24 +115,13 @@ impl Setup {
             learn_frames: config.camera.learn_frames,
             ..tracker::Config::new(timing, part.width)
         };
-        let nanoseconds = |s: f32| (f64::from(s) * 1e9).round() as i64;
-        let spectrum = spectrum::Config {
-            window_ns: nanoseconds(settings.window_s),
-            hop_ns: nanoseconds(settings.hop_s),
-            min_hz: settings.min_hz,
-            max_hz: settings.max_hz,
-            max_peaks: settings.max_peaks.into(),
-            false_alarm: settings.false_alarm,
-            um_per_px: settings.um_per_px,
-            ..spectrum::Config::default()
-        };
         Ok(Self {
             shape,
             part,
             part_start_ns: whole.start_ns(part.y),
             tracker,
             group,
-            spectrum,
+            spectrum: settings.spectrum(),
             window_frames: (frames * 1.25) as usize + 2,
             remarks,
         })

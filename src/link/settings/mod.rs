@@ -15,6 +15,9 @@ pub mod store;
 
 use serde::{Deserialize, Serialize};
 
+use crate::math::ns_of_s;
+use crate::spectrum;
+
 pub use check::{Limits, SettingsError};
 pub use console::{Board, Console};
 pub use key::{Key, ValueError};
@@ -97,6 +100,22 @@ impl Settings {
         unit: 1,
         lock: None,
     };
+}
+
+impl Settings {
+    /// What the settings mean for the spectrum, the same on every board; what they do not say is the default.
+    pub fn spectrum(&self) -> spectrum::Config {
+        spectrum::Config {
+            window_ns: ns_of_s(self.window_s),
+            hop_ns: ns_of_s(self.hop_s),
+            min_hz: self.min_hz,
+            max_hz: self.max_hz,
+            max_peaks: self.max_peaks.into(),
+            false_alarm: self.false_alarm,
+            um_per_px: self.um_per_px,
+            ..spectrum::Config::default()
+        }
+    }
 }
 
 impl Default for Settings {
