@@ -112,16 +112,6 @@ impl Kernel {
         }
     }
 
-    /// What is kept in a row, from column `from` on.
-    pub fn kept_coefficients(self, row: &[i8], from: usize) -> impl Iterator<Item = i8> {
-        let (plain, pairs) = match self.keeps_pairs() {
-            true => (None, Some(pairs::plain(row, from))),
-            false => (row.get(from..), None),
-        };
-        let plain = plain.unwrap_or_default().iter().copied();
-        plain.chain(pairs.into_iter().flatten())
-    }
-
     /// Lays what is kept in these columns of a row, of which the first is even and which are an even number, as it is into `to`,
     /// `by` columns to the right. `lanes` is what this has left there of the columns before, 0 at first.
     #[inline]

@@ -183,11 +183,6 @@ impl<'a> Tracker<'a> {
         self.stage
     }
 
-    /// Noise of one pixel, as measured while learning.
-    pub fn pixel_noise(&self) -> PixelNoise {
-        self.store.recipe().noise
-    }
-
     /// The band's level in use.
     pub fn level(&self) -> Level {
         self.store.recipe().level
