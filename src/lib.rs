@@ -5,66 +5,73 @@
 //! against its reference and which tones the motion is made of. It is `no_std`, never allocates, and knows
 //! no camera, no serial port, no file and no clock: lines come in with their times, bytes go out.
 //!
-//! Data moves one way; each stage is a module that can be used alone, each arrow a small plain type:
+//! Data moves one way, and each folder is one stage of it, in this order. [`pipeline`] is the one way in: it joins the
+//! stages, decides what a report warns of, and counts what is lost.
 //!
 //! ```text
-//!  camera::Line ─▶ tracker ─▶ timeline::Displacement ─▶ timeline ─▶ timeline::Sample ─▶ analyzer ─▶ report::Report ─▶ wire ─▶ bytes
-//!                  │ ▲                                  combines rows                   │ spectrum
-//!        correlates│ │reference, band, noise                                            │ tones by joint least squares
-//!                  ▼ │                                                                  ▼
-//!                 kernel (the inner product)                                           peaks, tracks, harmonics
+//! camera::Line ─▶ tracker ─▶ timeline ─▶ spectrum ─▶ report::Report ─▶ wire ─▶ bytes ─▶ link
+//!                  ▲   ▲      rows to     tones and                    text, binary,
+//!           reference  kernel samples     their shapes                 Modbus
 //! ```
 //!
-//! The line path:
-//!
-//! - [`camera`]: [`camera::Timing`] (line time, exposure, rows) and [`camera::Line`], a row with its time.
-//! - [`band`]: the reduced horizontal shearlet band, as the derivative filter that is needed of it.
-//! - [`mod@reference`]: from a reference row to the coefficients of its inner product.
-//! - [`kernel`]: the inner product, for each processor; the only unsafe code.
-//! - [`noise`]: the noise of a pixel, measured while learning.
-//! - [`tracker`]: learns the reference, finds each line's shift, knows when it is lost.
-//!
-//! Beside it, on another core or thread, never waited for:
-//!
-//! - [`timeline`]: rows become evenly spaced samples with weights, lost frames are counted.
-//! - [`spectrum`]: tones from the samples that exist, with their uncertainty; [`analyzer`] windows them.
+//! - [`pipeline`]: the line side, the report side, and both in one for one thread.
+//! - [`camera`]: [`camera::Line`], a row with its time; [`camera::Timing`] (line time, exposure, rows); raw formats.
+//! - [`kernel`]: the inner product for each processor, the only unsafe code.
+//! - [`mod@reference`]: what a row looks like at rest, from which the coefficients of its inner product are made.
+//! - [`tracker`]: learns the reference, finds each line's displacement, knows when it is lost.
+//! - [`timeline`]: displacements of rows become samples in time, with weights.
+//! - [`spectrum`]: the tones in a window of samples, with their uncertainty, by joint least squares.
 //! - [`report`]: what is said of a window, in which units.
-//! - [`wire`]: a report as bytes and back; [`link`], [`outbox`], [`settings`]: a board's end of the line.
+//! - [`wire`]: a report as bytes and back.
+//! - [`link`]: a board's end of the serial line: settings, the outbox, the Modbus server.
+//!
+//! Buffers are lent by the caller, configuration is plain data that is checked once, and no input makes the core
+//! panic. The line side never waits: what is late is dropped, counted and said.
 //!
 //! # Example
 //!
-//! A surface with a sinusoidal texture stands in front of a camera of 30 frames a second and swings at
-//! 7 Hz; the tracker reads its shift back:
+//! A surface stands in front of a camera of 50 frames a second and swings at 7.3 Hz. Its rows go in; a report comes out,
+//! and the sentence that a board sends of it:
 //!
 //! ```
 //! use rowtone::camera::{Line, Pixels, Timing};
-//! use rowtone::tracker::{Config, Outcome, StaticStorage, Tracker};
+//! use rowtone::pipeline::Pipeline;
+//! use rowtone::timeline::Group;
+//! use rowtone::wire::{Message, text};
+//! use rowtone::{spectrum, tracker};
 //!
 //! const WIDTH: usize = 64;
-//! const ROWS: usize = 8;
-//! let timing = Timing::new(30_000_000, 0, ROWS as u16)?; // 30 µs from row to row
-//! let mut config = Config::new(timing, WIDTH as u16);
-//! config.learn_frames = 8;
+//! const ROWS: usize = 16;
+//! let timing = Timing::new(1_000_000_000, 0, ROWS as u16)?; // 1 ms from row to row
+//! let group = Group::new(timing, 2)?; // two rows make a sample
 //! // The caller decides where memory lives: a static on a microcontroller, a heap on a desktop.
-//! let mut storage = StaticStorage::<{ WIDTH * ROWS }, ROWS, WIDTH>::new();
-//! let mut tracker = Tracker::new(config, storage.lend())?;
-//! let swing = |ns: i64| 0.2 * (core::f32::consts::TAU * 7.0 * ns as f32 * 1e-9).sin();
-//! let mut worst: f32 = 0.0;
-//! for frame in 0..60 {
+//! let mut picture = tracker::StaticStorage::<{ WIDTH * ROWS }, ROWS, WIDTH>::new();
+//! let mut windows = Box::new(spectrum::StaticStorage::<1024, 64, 8, 4096, 9>::new());
+//! let mut pipeline = Pipeline::new(
+//!     tracker::Config::new(timing, WIDTH as u16),
+//!     group,
+//!     spectrum::Config::default(), // windows of a second, twice a second
+//!     picture.lend(),
+//!     windows.lend(),
+//! )?;
+//! let swing_px = |ns: i64| 0.2 * (ns as f32 * 1e-9 * 7.3 * core::f32::consts::TAU).sin();
+//! let mut report = None;
+//! for frame in 0..150 {
 //!     for row in 0..ROWS as u16 {
-//!         let start_ns = i64::from(frame) * 33_333_333 + timing.start_ns(row);
+//!         let start_ns = i64::from(frame) * 20_000_000 + timing.start_ns(row);
 //!         let pixels: [u8; WIDTH] = core::array::from_fn(|x| {
-//!             let phase = (x as f32 - swing(start_ns)) * 0.6;
-//!             (128.0 + 80.0 * phase.sin() + 30.0 * (1.7 * phase).cos()).round() as u8
+//!             let phase = (x as f32 - swing_px(start_ns)) * 0.6;
+//!             (128.0 + 60.0 * phase.sin() + 30.0 * (1.7 * phase).cos()).round() as u8
 //!         });
 //!         let line = Line { frame, row, start_ns, pixels: Pixels::U8(&pixels) };
-//!         if let Outcome::Measured(displacement) = tracker.push(&line) {
-//!             // Each row's own reference position is unknown; here it is about the middle of the swing.
-//!             worst = worst.max((displacement.shift_px - swing(displacement.time_ns)).abs());
-//!         }
+//!         report = pipeline.push(&line).or(report);
 //!     }
 //! }
-//! assert!(worst < 0.05, "{worst}");
+//! let report = report.expect("a second of frames");
+//! assert!((report.peaks[0].hz - 7.3).abs() < 0.05);
+//! let mut sentence = [0; text::MAX_LINE];
+//! let sentence = text::encode_to_slice(&Message::Report { session: 1, report }, &mut sentence)?;
+//! assert!(sentence.starts_with(b"$RTRPT,1,")); // session 1; the peak stands as 7.3…/…
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 #![no_std]

@@ -24,17 +24,20 @@ use crate::{spectrum, tracker};
 /// let lines = tracker::Config::new(timing, 64);
 /// let mut pipeline =
 ///     Pipeline::new(lines, group, spectrum::Config::default(), picture.lend(), windows.lend())?;
-/// let mut reports = 0;
+/// let mut reports = Vec::new();
 /// for frame in 0..150_u32 {
 ///     for row in 0..16 {
 ///         let start_ns = i64::from(frame) * 20_000_000 + timing.start_ns(row);
-///         let pixels: [u8; 64] = core::array::from_fn(|x| 128 + (60.0 * (x as f32 * 0.6).sin()) as u8);
-///         let line = Line { frame, row, start_ns, pixels: Pixels::U8(&pixels) };
-///         reports += u32::from(pipeline.push(&line).is_some());
+///         let swing_px = 0.2 * (start_ns as f32 * 1e-9 * 7.3 * core::f32::consts::TAU).sin();
+///         let pixels: [u8; 64] = core::array::from_fn(|x| {
+///             let phase = (x as f32 - swing_px) * 0.6;
+///             (128.0 + 60.0 * phase.sin() + 30.0 * (1.7 * phase).cos()).round() as u8
+///         });
+///         reports.extend(pipeline.push(&Line { frame, row, start_ns, pixels: Pixels::U8(&pixels) }));
 ///     }
 /// }
-/// reports += pipeline.finish().into_iter().flatten().count() as u32;
-/// assert!(reports > 0);
+/// reports.extend(pipeline.finish().into_iter().flatten());
+/// assert!((reports[0].peaks[0].hz - 7.3).abs() < 0.05);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug)]

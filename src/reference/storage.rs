@@ -124,7 +124,7 @@ fn cut<'a, T>(
 /// ```
 /// use rowtone::{camera::Timing, tracker::{Config, StaticStorage, Tracker}};
 /// let mut storage = Box::new(StaticStorage::<{ 320 * 240 }, 240, 320>::new());
-/// assert!(core::mem::size_of_val(&*storage) <= 3 * 320 * 240 + 32 * 240 + 16 * 320);
+/// assert!(core::mem::size_of_val(&*storage) <= 3 * 320 * 240 + 68 * 240 + 16 * 320);
 /// let config = Config::new(Timing::new(67_200_000, 500_000, 240)?, 320);
 /// let tracker = Tracker::new(config, storage.lend())?;
 /// # Ok::<(), Box<dyn std::error::Error>>(())

@@ -53,7 +53,7 @@ pub struct Storage<'a> {
 /// ```
 /// use rowtone::spectrum::StaticStorage;
 /// let mut storage = Box::new(StaticStorage::<4096, 96, 96, 8192, 9>::new());
-/// assert!(core::mem::size_of_val(&*storage) < 125 * 1024);
+/// assert!(core::mem::size_of_val(&*storage) < 128 * 1024);
 /// let storage = storage.lend();
 /// assert_eq!(storage.estimator.grid.len(), 8192);
 /// ```
