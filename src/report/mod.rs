@@ -26,7 +26,7 @@ pub struct Peak {
     pub amplitude_px_sd: f32,
     /// Power of the tone over the noise left in the whole window: 10·log₁₀(N·A²/(4σ²)), dB.
     pub snr_db: f32,
-    /// Too near a multiple of the frame rate to be trusted.
+    /// Too near a multiple of the frame rate to be trusted, or weak in a short window and not seen before.
     pub ambiguous: bool,
     /// The same number from window to window while the tone is the same; from 1.
     pub track: u16,

@@ -5,11 +5,26 @@ use crate::report::{MAX_PEAKS, Peak};
 /// Highest harmonic that is named.
 const MOST_HARMONIC: u8 = 20;
 
+/// Windows shorter than one over so much tell too few cells of narrow noise from a tone, Hz.
+const SHORT_HZ: f32 = 2.0;
+
+/// A tone of less over the noise may be a peak of narrow noise in a short window, dB.
+const WEAK_DB: f32 = 17.0;
+
+/// A tone is the same again within so many standard deviations.
+const SAME: f32 = 3.0;
+
+/// In a short window a weak peak is sure only where it is seen again.
+fn may_be_noise(peak: &Peak, resolution_hz: f32) -> bool {
+    resolution_hz > SHORT_HZ && peak.snr_db < WEAK_DB
+}
+
 /// A tone that was seen.
 #[derive(Clone, Copy, Debug)]
 struct Track {
     number: u16,
     hz: f32,
+    hz_sd: f32,
     hz_per_s: f32,
     /// Windows since it was last seen.
     missed: u8,
@@ -66,11 +81,15 @@ impl Follower {
                 break;
             };
             peak.track = track.number;
-            track.hz = peak.hz;
+            let sd = crate::math::sqrtf(peak.hz_sd * peak.hz_sd + track.hz_sd * track.hz_sd);
+            let again = (peak.hz - track.hz).abs() < SAME * sd;
+            peak.ambiguous |= may_be_noise(peak, resolution_hz) && !again;
+            (track.hz, track.hz_sd) = (peak.hz, peak.hz_sd);
             track.hz_per_s = hz_per_s.get(i).copied().unwrap_or(0.0);
             track.missed = 0;
         }
         for (i, peak) in peaks.iter_mut().enumerate().filter(|(_, p)| p.track == 0) {
+            peak.ambiguous |= may_be_noise(peak, resolution_hz);
             self.last = self.last.checked_add(1).unwrap_or(1);
             peak.track = self.last;
             if self.tracks.is_full() {
@@ -83,6 +102,7 @@ impl Follower {
             let _ = self.tracks.push(Track {
                 number: peak.track,
                 hz: peak.hz,
+                hz_sd: peak.hz_sd,
                 hz_per_s: hz_per_s.get(i).copied().unwrap_or(0.0),
                 missed: 0,
             });
