@@ -237,8 +237,9 @@ impl Noise {
             return false;
         }
         let cells = 2.0 * sum * sum / (squares * p.places()).max(f32::MIN_POSITIVE);
-        // Written so that a NaN may be narrow.
-        !(z > exceeded(cells).max(least_ratio) * largest)
+        // What is no number may be narrow.
+        let stands_out = z > exceeded(cells).max(least_ratio) * largest;
+        !stands_out
     }
 }
 

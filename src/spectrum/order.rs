@@ -67,7 +67,9 @@ impl Residue {
 
 /// Whether an F of `d1` and `d2` degrees of freedom is larger than one of 10 000 is (Paulson 1942).
 pub(crate) fn is_rare(f: f32, d1: f32, d2: f32) -> bool {
-    if !(f > 1.0) || d1 < 1.0 || d2 < 1.0 {
+    // Not true of what is no number.
+    let large = f > 1.0;
+    if !large || d1 < 1.0 || d2 < 1.0 {
         return false;
     }
     let root = libm::cbrtf(f);

@@ -23,7 +23,7 @@ pub(crate) struct Band {
 
 impl Band {
     /// How far `hz` is from the nearest multiple of the frame rate, Hz; infinitely where there is no single one.
-    pub(crate) fn from_multiple(&self, hz: f32) -> f32 {
+    pub(crate) fn away_from_multiple(&self, hz: f32) -> f32 {
         self.fps.map_or(f32::INFINITY, |fps| {
             (hz - fps * libm::roundf(hz / fps)).abs()
         })
@@ -153,7 +153,7 @@ impl Periodogram<'_> {
     /// z at place `b` over c(f), or `None` where the removal of the offsets leaves too little to say.
     pub(crate) fn level(&self, b: usize) -> Option<f32> {
         let z = *self.z.get(b)?;
-        let away = self.band.from_multiple(b as f32 * self.bin_hz) * self.length_s;
+        let away = self.band.away_from_multiple(b as f32 * self.bin_hz) * self.length_s;
         if away >= 1.0 {
             return Some(z);
         }
@@ -167,7 +167,7 @@ impl Periodogram<'_> {
 
     /// So near a multiple of the frame rate that it is hidden in part.
     pub(crate) fn is_hidden(&self, hz: f32) -> bool {
-        self.band.from_multiple(hz) * self.length_s < 1.2
+        self.band.away_from_multiple(hz) * self.length_s < 1.2
     }
 
     /// The largest z of the places within half a cell of `hz`, of either sign.

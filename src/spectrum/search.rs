@@ -340,11 +340,9 @@ impl Search {
         let near =
             |a: &Tone, b: &Tone| a.frequency.above(b.frequency).abs() * residual.length_s() < PAIR;
         let cluster = |a: &Tone| model.tones.iter().filter(|b| near(a, b)).count() >= CLUSTER;
-        !early && model.tones.iter().any(cluster)
-            || !early
-                && p.is_some_and(|p| {
-                    !noise.is_worth_a_fit(strongest.frequency.hz(), 0.5 * strongest.gain, &p)
-                })
+        let (at, power) = (strongest.frequency.hz(), 0.5 * strongest.gain);
+        let hopeless = || p.is_some_and(|p| !noise.is_worth_a_fit(at, power, &p));
+        !early && (model.tones.iter().any(cluster) || hopeless())
     }
 
     /// Makes `best` the model with the candidate that explains most, as a further tone, and says whether there is one. Those

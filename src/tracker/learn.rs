@@ -173,7 +173,7 @@ impl Tracker<'_> {
         if textured && row % NOISE_ROWS == self.frames_in_stage as usize % NOISE_ROWS {
             self.measure_noise(row, pixels, shift_px, seen.frames);
         }
-        let down_px = self.planar.down_px();
+        let down_px = self.planar.near_down_px();
         let place_px = [shift_px, down_px];
         self.store
             .average(row, pixels, place_px, self.light.to_reference, u16::MAX);
@@ -242,7 +242,7 @@ impl Tracker<'_> {
             let frames = f32::from(frames);
             self.meter.add_line(
                 mean,
-                self.store.beside(row, self.planar.down_px()),
+                self.store.beside(row, self.planar.near_down_px()),
                 pixels,
                 shift_px,
                 1.0 / self.light.to_reference,

@@ -598,7 +598,7 @@ impl Tracker<'_> {
             && self.schedule.turn == row
         {
             let hurried = self.is_hurried();
-            let place_px = [shift_px, self.planar.down_px()];
+            let place_px = [shift_px, self.planar.near_down_px()];
             self.store
                 .follow_row(row, pixels, place_px, self.light.to_reference, hurried);
         }

@@ -75,7 +75,7 @@ pub(super) struct Planar {
 
 impl Planar {
     /// Where the present line is along the columns, px.
-    pub(super) fn down_px(&self) -> f32 {
+    pub(super) fn near_down_px(&self) -> f32 {
         self.near_px
     }
 
@@ -399,7 +399,8 @@ impl Tracker<'_> {
         let (shift_px, vertical) = planar.settle(upright_px, second, vertical_table);
         let information_per_px2 = table.information_per_px2();
         // Not true of what is no number.
-        if !(vertical.shift_px.abs() < f32::MAX) {
+        let known = vertical.shift_px.abs() < f32::MAX;
+        if !known {
             return None;
         }
         planar.accept(information);

@@ -74,7 +74,7 @@ impl Tracker<'_> {
     fn fits_in_shade<P: Pixel>(&mut self, row: usize, pixels: &[P], shift_px: f32) -> bool {
         let columns = self.check.columns_in_shade(self.check_columns());
         let to_reference = self.light.to_reference;
-        let (store, place_px) = (&self.store, [shift_px, self.planar.down_px()]);
+        let (store, place_px) = (&self.store, [shift_px, self.planar.near_down_px()]);
         let shaded = Residual::of::<true, P>(store, row, pixels, place_px, to_reference, columns);
         shaded.is_some_and(|residual| self.check.fits(&residual, self.stage))
     }
@@ -93,7 +93,7 @@ impl Tracker<'_> {
         shift_px: f32,
     ) -> Option<Residual> {
         let (columns, to_reference) = (self.check_columns(), self.light.to_reference);
-        let place_px = [shift_px, self.planar.down_px()];
+        let place_px = [shift_px, self.planar.near_down_px()];
         Residual::of::<false, P>(&self.store, row, pixels, place_px, to_reference, columns)
     }
 

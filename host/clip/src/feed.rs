@@ -161,9 +161,8 @@ impl Feed {
             if stopped() {
                 return Ok(None);
             }
-            match self.inlet.receive_within(ASKED_EVERY) {
-                Some(arrival) => break arrival,
-                None => {}
+            if let Some(arrival) = self.inlet.receive_within(ASKED_EVERY) {
+                break arrival;
             }
         };
         match arrival {

@@ -115,7 +115,7 @@ impl Recording {
         let stride = reader.stride() as u64;
         let about = About {
             frames: Some(behind_header / stride),
-            ends_in_a_frame: behind_header % stride > 0,
+            ends_in_a_frame: !behind_header.is_multiple_of(stride),
             probe: None,
         };
         let source: Box<dyn FrameSource + Send> = match MappedReader::new(&reader) {
