@@ -75,8 +75,9 @@ fn solve<const N: usize>(mut a: [[f64; N]; N], mut b: [f64; N]) -> [f64; N] {
         for i in 0..N {
             if i != k {
                 let f = a[i][k] / a[k][k];
-                for j in 0..N {
-                    a[i][j] -= f * a[k][j];
+                let pivot = a[k];
+                for (own, pivot) in a[i].iter_mut().zip(pivot) {
+                    *own -= f * pivot;
                 }
                 b[i] -= f * b[k];
             }

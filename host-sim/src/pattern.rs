@@ -107,12 +107,15 @@ mod tests {
 
     #[test]
     fn a_pattern_has_the_asked_size_and_is_the_same_every_time() {
-        let mut config = Config::default();
-        config.defects = Defects {
+        let defects = Defects {
             hot_pixels: 7,
             prnu: 0.02,
             column_pattern: 0.01,
             ..Defects::default()
+        };
+        let config = Config {
+            defects,
+            ..Config::default()
         };
         let (one, again) = (Pattern::new(&config), Pattern::new(&config));
         let n = one.gains.len() as f64;

@@ -148,8 +148,9 @@ impl Scene {
         for k in 0..2 {
             for i in k + 1..4 {
                 let f = m[i][k] / m[k][k];
-                for j in 0..4 {
-                    m[i][j] -= f * m[k][j];
+                let above = m[k];
+                for (own, above) in m[i].iter_mut().zip(above) {
+                    *own -= f * above;
                 }
             }
         }

@@ -121,6 +121,8 @@ pub(crate) fn subscribe(port: u16, topic: &str) -> (Listener, Receiver<(String, 
         .spawn()
         .expect("apt-get install mosquitto-clients");
     let lines = BufReader::new(child.stdout.take().unwrap()).lines();
+    // Ended where this function is left, whichever way.
+    let listener = Listener(child);
     let (ready_to, ready) = channel();
     std::thread::spawn(move || {
         for line in lines.map_while(Result::ok) {
@@ -142,7 +144,7 @@ pub(crate) fn subscribe(port: u16, topic: &str) -> (Listener, Receiver<(String, 
     loop {
         publish(port, &topic.replace(['+', '#'], "ready"), READY);
         if ready.recv_timeout(Duration::from_millis(200)).is_ok() {
-            return (Listener(child), heard);
+            return (listener, heard);
         }
         assert!(start.elapsed().as_secs() < 20, "no subscription");
     }

@@ -212,7 +212,7 @@ fn to_string(
 mod tests {
     use super::Place;
     use crate::example;
-    use rowtone::report::{FloorPoint, Motion, PeakShape, ShapeRow};
+    use rowtone::report::{Motion, PeakShape, ShapeRow};
 
     #[test]
     fn the_keys_are_the_contract() {

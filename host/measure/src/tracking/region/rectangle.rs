@@ -373,7 +373,7 @@ mod tests {
             )
         };
         assert!(camera_moves(&[shake.clone(), machine(0.05)], COLUMNS, ROWS));
-        assert!(!camera_moves(&[shake.clone()], COLUMNS, ROWS));
+        assert!(!camera_moves(std::slice::from_ref(&shake), COLUMNS, ROWS));
         // All of the machine is in the picture.
         let all = tiles(0.01, |_, _| [0.0, 0.05]);
         assert!(!camera_moves(&[shake.clone(), all], COLUMNS, ROWS));
