@@ -323,6 +323,44 @@ fn ffmpeg_ends_with_us() {
     assert!(gone, "ffmpeg is still there after five seconds");
 }
 
+/// A codec that predicts frames from each other takes small motions away, which its pixels show: also where they
+/// come through a pipe. One that loses nothing, or codes each frame by itself, does not.
+#[test]
+fn what_a_codec_took_is_warned_of() {
+    let folder = folder("codec");
+    let clip = file("codec/clip.y4m", &y4m(config(60)));
+    let warns = |path: &Path| {
+        let output = on_clip("analyze", path, &["--format", "json"]);
+        let (stdout, stderr) = texts(&output);
+        let of_all = reports(&stdout);
+        assert!(!of_all.is_empty(), "{stderr}");
+        let warned = |report: &serde_json::Value| {
+            report["warnings"]
+                .as_array()
+                .unwrap()
+                .contains(&"compressed".into())
+        };
+        assert!(
+            of_all.iter().all(warned) || !of_all.iter().any(warned),
+            "{stdout}"
+        );
+        warned(&of_all[0])
+    };
+    let lossy = ["-pix_fmt", "yuv420p", "-c:v", "libx264", "-crf", "23"];
+    let (small, piped) = (folder.join("small.mp4"), folder.join("piped.y4m"));
+    encode(&clip, &lossy, &small);
+    encode(&small, &["-pix_fmt", "yuv420p"], &piped);
+    assert!(warns(&small) && warns(&piped));
+    let (exact, alone) = (folder.join("exact.mp4"), folder.join("alone.avi"));
+    encode(&clip, &LOSSLESS, &exact);
+    encode(
+        &clip,
+        &["-pix_fmt", "yuvj420p", "-c:v", "mjpeg", "-q:v", "2"],
+        &alone,
+    );
+    assert!(!warns(&clip) && !warns(&exact) && !warns(&alone));
+}
+
 /// `calibrate` reads the same files.
 #[test]
 fn calibrate_takes_a_video() {

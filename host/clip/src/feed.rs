@@ -107,7 +107,7 @@ impl Feed {
             Some(clock) => clock,
             None => args.clock(source.header(), &about)?,
         };
-        let camera = args.camera(source.header(), &clock, &about)?;
+        let camera = args.camera(source.header(), &clock)?;
         let notes = args.notes(source.header(), &about);
         let frames = about.frames;
         let ahead = match frames {

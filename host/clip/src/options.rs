@@ -286,7 +286,7 @@ impl CameraArgs {
     ///
     /// # Errors
     /// [`Failure::Usage`] for a part outside the picture; [`Failure::Input`] for a calibration file that cannot be used.
-    pub fn camera(&self, header: &Header, clock: &Clock, about: &About) -> Result<Camera, Failure> {
+    pub fn camera(&self, header: &Header, clock: &Clock) -> Result<Camera, Failure> {
         self.check()?;
         let fps = clock.fps();
         let (width, height) = (header.width, header.height);
@@ -312,7 +312,6 @@ impl CameraArgs {
         let mut warnings = Warnings::NONE;
         warnings.insert_if(known_us.is_none(), Warning::ExposureUnknown);
         warnings.insert_if(clock.coarse_ns().is_some(), Warning::CoarseTimes);
-        warnings.insert_if(about.is_compressed_for_good(), Warning::Compressed);
         // A sensor that reads its last row first: turned upside down, rows are in order of time again.
         let turn = match calibrated {
             Some(calibrated) if calibrated.upward => self.rotate.upside_down(),

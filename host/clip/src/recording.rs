@@ -14,9 +14,6 @@ use super::mapped::MappedReader;
 use super::source::FrameSource;
 use super::y4m::Reader;
 
-/// Key frames of a clip from which on what an encoder took can be told from them.
-const ENOUGH_KEY_FRAMES: u64 = 3;
-
 /// What is known of a recording beforehand, beside its header.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct About {
@@ -26,16 +23,6 @@ pub struct About {
     pub ends_in_a_frame: bool,
     /// What ffprobe says of a video file; `None` for Y4M.
     pub probe: Option<Probe>,
-}
-
-impl About {
-    /// Pictures were coded by means of others, and so few by themselves that these do not tell what the
-    /// encoder took of small motions.
-    pub fn is_compressed_for_good(&self) -> bool {
-        self.probe
-            .as_ref()
-            .is_some_and(|probe| probe.is_predicted() && probe.key_frames < ENOUGH_KEY_FRAMES)
-    }
 }
 
 /// A recording, opened.

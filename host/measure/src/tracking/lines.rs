@@ -3,8 +3,10 @@
 use std::panic::resume_unwind;
 use std::thread;
 
+use rowtone::report::{Warning, Warnings};
 use rowtone::timeline::{Displacement, Group};
 
+use super::codec;
 use super::region::{self, Choice, Region};
 use super::{Chosen, Ending, Engine, FrameShifts, Wanted, background};
 use crate::memory::TrackerMemory;
@@ -82,6 +84,16 @@ fn measure_all(
     if let Some(cut) = kept.iter().find(|frame| frame.is_cut()) {
         return Err(feed.cut_short(cut));
     }
+    // What a codec or a denoiser took shows in the part that is measured.
+    let seen = Rect {
+        x: region.columns.start,
+        y: region.rows.start,
+        width: region.columns.len(),
+        height: region.rows.len(),
+    };
+    lines
+        .found
+        .insert_if(codec::is_between(&kept, &seen), Warning::Compressed);
     let note = (!notes.is_empty()).then(|| notes.join("\n"));
     lines.run(feed, kept, more, note, to)
 }
@@ -135,6 +147,8 @@ struct Lines<'a> {
     slips_told: bool,
     /// What is measured, until the first frame takes it along.
     chosen: Option<Chosen>,
+    /// What was found out about the recording and has not been sent yet.
+    found: Warnings,
 }
 
 /// What is told when stripes were mistaken.
@@ -175,6 +189,7 @@ impl<'a> Lines<'a> {
             combines: groups.is_some(),
             slips_told: false,
             chosen: None,
+            found: Warnings::NONE,
         })
     }
 
@@ -257,6 +272,7 @@ impl<'a> Lines<'a> {
         shifts.start_ns = frame.start_ns;
         shifts.note = note;
         shifts.chosen = self.chosen.take();
+        shifts.warnings = std::mem::take(&mut self.found);
         shifts.rows.clear();
         shifts.readings.clear();
         let (rows, readings) = (&mut shifts.rows, &mut shifts.readings);

@@ -8,11 +8,13 @@
 //! does not grow with the length of the recording, and nothing is sent line by line.
 
 mod background;
+mod codec;
 mod engine;
 mod lines;
 pub mod region;
 
 use rowtone::pipeline::Reading;
+use rowtone::report::Warnings;
 use rowtone::timeline::{Displacement, Group};
 use rowtone::tracker::Axes;
 
@@ -47,6 +49,8 @@ pub struct FrameShifts {
     pub readings: Vec<Reading>,
     /// With the first frame: what is measured.
     pub chosen: Option<Chosen>,
+    /// What was found out about the recording, from this frame on.
+    warnings: Warnings,
     /// Something to tell the user at once, a line each.
     note: Option<String>,
 }
@@ -136,6 +140,7 @@ impl Shifts {
     pub fn next_frame(&mut self) -> Result<Option<FrameShifts>, Failure> {
         match self.inlet.receive() {
             Next::Item(mut frame) => {
+                self.camera.warnings = self.camera.warnings.union(frame.warnings);
                 if let Some(note) = frame.note.take()
                     && !self.quiet
                 {
