@@ -28,6 +28,7 @@ pub mod monitor;
 pub mod simulate;
 #[cfg(feature = "lab")]
 pub mod sweep;
+pub mod verify;
 
 /// Measures vibration with a rolling-shutter camera: every row of a frame is a sample in time.
 #[derive(Debug, Parser)]
@@ -63,6 +64,8 @@ enum Command {
     Simulate(simulate::Args),
     /// Line time, read-out, blank time and exposure of a camera, from a flashing light
     Calibrate(calibrate::Args),
+    /// Scores the program on recordings whose truth is known
+    Verify(verify::Args),
     /// Measures the project's own figures anew, from a seed
     #[cfg(feature = "lab")]
     Sweep(sweep::Args),
@@ -95,6 +98,7 @@ fn run(command: &Command) -> Result<(), Failure> {
         Command::Gateway(args) => missing::run(args, "gateway", "gateway"),
         Command::Simulate(args) => simulate::run(args),
         Command::Calibrate(args) => calibrate::run(args),
+        Command::Verify(args) => verify::run(args),
         #[cfg(feature = "lab")]
         Command::Sweep(args) => sweep::run(args),
         #[cfg(feature = "lab")]
