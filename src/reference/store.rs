@@ -114,6 +114,13 @@ impl<'a> Store<'a> {
         self.buffers.learning.get(row).map_or(0, |l| l.print)
     }
 
+    /// Keeps the print of a row's line; true where it was another.
+    #[inline(always)]
+    pub(crate) fn replace_print(&mut self, row: usize, print: u32) -> bool {
+        let before = self.buffers.learning.get_mut(row).map(|l| &mut l.print);
+        before.is_some_and(|before| core::mem::replace(before, print) != print)
+    }
+
     /// Keeps the print of a row's line.
     #[inline(always)]
     pub(crate) fn set_print(&mut self, row: usize, print: u32) {

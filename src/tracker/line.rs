@@ -175,8 +175,13 @@ impl Tracker<'_> {
         if !is_fast {
             return Err(None);
         }
-        let measured = self.measure_fast(usize::from(line.row), pixels)?;
-        Ok(self.accept(usize::from(line.row), measured, times))
+        let row = usize::from(line.row);
+        let measured = self.measure_fast(row, pixels)?;
+        if !self.store.replace_print(row, measured.print) {
+            // The same line again.
+            return Err(None);
+        }
+        Ok(self.accept(measured, times))
     }
 
     /// What a line comes to where the picture has moved little; the light as it was with the line before is still there.
@@ -197,8 +202,7 @@ impl Tracker<'_> {
         let surprise_px = shift_px - self.prediction.predicted_px();
         // Neither is true of what is no number.
         let small = shift_px.abs() <= self.correlator.near_px && Prediction::is_small(surprise_px);
-        let repeated = self.store.print(row) == print;
-        if !small || repeated || !self.light.may_become(to_reference) {
+        if !small || !self.light.may_become(to_reference) {
             return Err(Some((product, sum)));
         }
         Ok(Measured {
@@ -211,15 +215,14 @@ impl Tracker<'_> {
     }
 
     #[inline(always)]
-    fn accept(&mut self, row: usize, measured: Measured, times: bool) -> Place {
+    fn accept(&mut self, measured: Measured, times: bool) -> Place {
         let Measured {
             shift_px,
             surprise_px,
             to_reference,
             information_per_px2,
-            print,
+            ..
         } = measured;
-        self.store.set_print(row, print);
         if times {
             self.light.add_settled(to_reference);
         }
@@ -250,6 +253,9 @@ impl Tracker<'_> {
         }
         let row = usize::from(line.row);
         let measured = self.measure_fast(row, pixels)?;
+        if !self.store.replace_print(row, measured.print) {
+            return Err(None);
+        }
         self.correlator.products = 0;
         if row >= self.schedule.next_check {
             let before = core::mem::replace(&mut self.light.to_reference, measured.to_reference);
@@ -264,7 +270,7 @@ impl Tracker<'_> {
             // The reference is not being moved.
             self.work_in_background::<R::P>(row);
         }
-        let place = self.accept(row, measured, times);
+        let place = self.accept(measured, times);
         self.settle_fast_path(line.frame);
         Ok(place)
     }

@@ -8,7 +8,7 @@
 use crate::camera::pixel::Pixel;
 
 /// Pixels of a line that a print is made of.
-const PIXELS: usize = 64;
+const PIXELS: usize = 16;
 
 /// The print of a line by Σ h·p and Σ p.
 #[inline(always)]
