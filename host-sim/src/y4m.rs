@@ -2,6 +2,8 @@
 
 use std::io::{self, Write};
 
+use rowtone_clip::{Header, PixelFormat};
+
 use super::config::Sensor;
 use super::frame::{Frame, PixelBuffer};
 use super::schedule::Slot;
@@ -11,29 +13,14 @@ use super::schedule::Slot;
 /// # Errors
 /// What the writer says.
 pub fn write_header(out: &mut impl Write, sensor: &Sensor) -> io::Result<()> {
-    let (numerator, denominator) = rate(sensor.fps);
-    let depth = if sensor.bits == 8 {
-        String::new()
-    } else {
-        sensor.bits.to_string()
+    let header = Header {
+        width: sensor.cols as usize,
+        height: sensor.rows as usize,
+        fps: Some(sensor.fps),
+        unusable_rate: None,
+        format: PixelFormat::luma(sensor.bits),
     };
-    let (w, h) = (sensor.cols, sensor.rows);
-    writeln!(
-        out,
-        "YUV4MPEG2 W{w} H{h} F{numerator}:{denominator} Ip A1:1 Cmono{depth}"
-    )
-}
-
-/// A frame rate as a ratio of whole numbers, to a part in 10⁹ or better below 2000 Hz.
-fn rate(fps: f64) -> (u64, u64) {
-    let denominators = [1u64, 1000, 1001, 1_000_000];
-    let exact = |&d: &u64| ((fps * d as f64).round() / d as f64 - fps).abs() <= 1e-12 * fps;
-    let d = denominators
-        .iter()
-        .copied()
-        .find(exact)
-        .unwrap_or(1_000_000);
-    (((fps * d as f64).round() as u64).max(1), d)
+    header.write(out)
 }
 
 /// Writes one frame.
@@ -94,14 +81,6 @@ mod tests {
             let pixel = if bits == 8 { 1 } else { 2 };
             assert_eq!(out.len() - header, 3 * (6 + 128 * 300 * pixel));
         }
-    }
-
-    #[test]
-    fn rates_are_exact() {
-        assert_eq!(rate(60.0), (60, 1));
-        assert_eq!(rate(58.9), (58_900, 1000));
-        assert_eq!(rate(30_000.0 / 1001.0), (30_000, 1001));
-        assert_eq!(rate(0.1234567), (123_457, 1_000_000));
     }
 
     #[test]

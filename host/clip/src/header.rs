@@ -1,5 +1,7 @@
 //! The header of a Y4M file: its first line.
 
+use std::io::{self, Write};
+
 use super::PixelFormat;
 
 /// What every Y4M file starts with.
@@ -89,6 +91,20 @@ impl Header {
         }
     }
 
+    /// Writes it as a progressive video of square pixels.
+    ///
+    /// # Errors
+    /// What the writer says.
+    pub fn write(&self, out: &mut impl Write) -> io::Result<()> {
+        // 0:0 is a rate that is not known.
+        let (numerator, denominator) = self.fps.map_or((0, 0), rate);
+        let (width, height, tag) = (self.width, self.height, self.format.tag());
+        writeln!(
+            out,
+            "YUV4MPEG2 W{width} H{height} F{numerator}:{denominator} Ip A1:1 C{tag}"
+        )
+    }
+
     /// Bytes of the luma plane of one frame.
     pub(super) fn luma_bytes(&self) -> usize {
         self.width * self.height * if self.format.bits > 8 { 2 } else { 1 }
@@ -102,6 +118,18 @@ impl Header {
     }
 }
 
+/// A frame rate as a ratio of whole numbers, to a part in 10⁹ or better below 2000 Hz.
+fn rate(fps: f64) -> (u64, u64) {
+    let denominators = [1u64, 1000, 1001, 1_000_000];
+    let exact = |&d: &u64| ((fps * d as f64).round() / d as f64 - fps).abs() <= 1e-12 * fps;
+    let d = denominators
+        .iter()
+        .copied()
+        .find(exact)
+        .unwrap_or(1_000_000);
+    (((fps * d as f64).round() as u64).max(1), d)
+}
+
 /// `30000:1001` as a frame rate; `0:0`, nonsense and what no camera has are none.
 fn ratio(text: &str) -> Option<f64> {
     let (numerator, denominator) = text.split_once(':')?;
@@ -111,3 +139,37 @@ fn ratio(text: &str) -> Option<f64> {
 
 /// Frame rates that can be measured at, Hz.
 pub(super) const FPS: std::ops::RangeInclusive<f64> = 1e-3..=1e7;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rates_are_exact() {
+        assert_eq!(rate(60.0), (60, 1));
+        assert_eq!(rate(58.9), (58_900, 1000));
+        assert_eq!(rate(30_000.0 / 1001.0), (30_000, 1001));
+        assert_eq!(rate(0.1234567), (123_457, 1_000_000));
+    }
+
+    #[test]
+    fn what_is_written_is_read() {
+        for tag in [
+            "mono", "mono10", "mono16", "420", "422p10", "411", "440p12", "444", "444alpha",
+        ] {
+            for fps in [None, Some(60.0), Some(30_000.0 / 1001.0), Some(58.9)] {
+                let header = Header {
+                    width: 1920,
+                    height: 1080,
+                    fps,
+                    unusable_rate: None,
+                    format: PixelFormat::from_tag(tag).expect(tag),
+                };
+                let mut line = Vec::new();
+                header.write(&mut line).expect("memory");
+                assert_eq!(line.pop(), Some(b'\n'));
+                assert_eq!(Header::parse(&line), Ok(header));
+            }
+        }
+    }
+}

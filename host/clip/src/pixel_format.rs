@@ -79,6 +79,23 @@ impl PixelFormat {
         Some(Self { bits, chroma })
     }
 
+    /// The tag that [`PixelFormat::from_tag`] reads.
+    pub fn tag(&self) -> String {
+        let (family, deep) = match self.chroma {
+            Chroma::None => ("mono", ""),
+            Chroma::C420 => ("420", "p"),
+            Chroma::C422 => ("422", "p"),
+            Chroma::C411 => ("411", "p"),
+            Chroma::C440 => ("440", "p"),
+            Chroma::C444 => ("444", "p"),
+            Chroma::C444Alpha => return "444alpha".to_owned(),
+        };
+        match self.bits {
+            8 => family.to_owned(),
+            bits => format!("{family}{deep}{bits}"),
+        }
+    }
+
     /// Bytes of one value.
     pub const fn bytes_per_value(&self) -> usize {
         if self.bits > 8 { 2 } else { 1 }
