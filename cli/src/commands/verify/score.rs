@@ -136,12 +136,12 @@ mod tests {
 
     fn report(window_s: f32, peaks: &[(f32, f32, bool)]) -> Report {
         let example = rowtone_report::example(None);
-        let like = example.peaks[0].clone();
+        let like = example.peaks[0];
         let peak = |&(hz, amplitude_px, ambiguous): &(f32, f32, bool)| Peak {
             hz,
             amplitude_px,
             ambiguous,
-            ..like.clone()
+            ..like
         };
         Report {
             window_s,
