@@ -36,7 +36,7 @@ pub struct Collector<'a> {
     dropped_windows: u32,
     /// A window was dropped since the last one was handed over.
     missed: bool,
-    /// What is told of the frame that is stored next.
+    /// What became of frames that had no sample, since the newest that is held.
     tally: Tally,
     /// Of the sample stored last.
     curvature: Curvature,
@@ -81,7 +81,11 @@ impl<'a> Collector<'a> {
 
     /// As [`super::ReportSide::push`]; a complete window waits for [`Collector::hand_over`] until the next push.
     pub fn push(&mut self, reading: impl Into<Reading>) -> bool {
-        let Reading { sample, tally } = reading.into();
+        let Reading {
+            sample,
+            tally,
+            frame,
+        } = reading.into();
         if self.ready.take().is_some() {
             self.dropped_windows = self.dropped_windows.saturating_add(1);
             self.missed = true;
@@ -89,12 +93,11 @@ impl<'a> Collector<'a> {
         if let Some(pending) = self.pending.take() {
             self.store(pending);
         }
-        self.note(&tally);
-        sample.is_some_and(|sample| self.take(sample, &tally))
+        self.note(frame, &tally);
+        sample.is_some_and(|sample| self.take(sample))
     }
 
-    /// Takes a sample that came with this tally.
-    fn take(&mut self, sample: Sample, tally: &Tally) -> bool {
+    fn take(&mut self, sample: Sample) -> bool {
         let second = self.second(&sample);
         let known = (sample.information_per_px2 > 0.0
             || sample.information_per_px2 == 0.0 && second.is_some())
@@ -118,11 +121,6 @@ impl<'a> Collector<'a> {
             .is_some_and(|f| start_ns < since(f.start_ns, self.window_ns));
         if back || (new_frame && start_ns >= since(self.end_ns, self.slack_ns())) {
             let complete = self.complete(self.end_ns);
-            // Frames without a sample lie between: what became of them is said of both windows.
-            let next = self.newest().map(|f| f.number.wrapping_add(1));
-            if next != Some(sample.frame) {
-                self.tally.add(tally);
-            }
             self.pending = Some(sample);
             self.advance(start_ns, back);
             return complete;
@@ -187,21 +185,28 @@ impl<'a> Collector<'a> {
     /// A sample came too late for its frame.
     fn drop_sample(&mut self) {
         self.dropped_samples = self.dropped_samples.saturating_add(1);
-        self.note(&Tally {
+        let tally = Tally {
             dropped_samples: 1,
             ..Tally::NONE
-        });
+        };
+        self.note_newest(&tally);
     }
 
-    /// Adds what became of rows to the newest frame; where there is none, to the one that comes.
-    fn note(&mut self, tally: &Tally) {
-        let newest = match self.held.checked_sub(1) {
-            Some(i) if !self.restart => self.ring.frames.get_mut((self.oldest + i) % self.capacity),
-            _ => None,
-        };
-        match newest {
-            Some(frame) => frame.tally.add(tally),
-            None => self.tally.add(tally),
+    /// Adds what became of rows up to those of `frame`: to that frame where it is the newest that is held, or else to what
+    /// is told of both sides of the gap that opens behind the newest.
+    fn note(&mut self, frame: u32, tally: &Tally) {
+        let held = self.newest().is_some_and(|f| f.number == frame);
+        if held && !self.restart {
+            self.note_newest(tally);
+        } else {
+            self.tally.add(tally);
+        }
+    }
+
+    fn note_newest(&mut self, tally: &Tally) {
+        let newest = self.held.checked_sub(1).map(|i| self.column(i));
+        if let Some(frame) = newest.and_then(|column| self.ring.frames.get_mut(column)) {
+            frame.tally.add(tally);
         }
     }
 
@@ -299,10 +304,11 @@ impl<'a> Collector<'a> {
             let first = self.held == 1 || *spread == Spread::default();
             if !follow_spread(spread, sample.spread, first, &self.group.even_spread()) {
                 self.dropped_samples = self.dropped_samples.saturating_add(1);
-                self.note(&Tally {
+                let tally = Tally {
                     thin_groups: 1,
                     ..Tally::NONE
-                });
+                };
+                self.note_newest(&tally);
                 return;
             }
         }
@@ -343,9 +349,21 @@ impl<'a> Collector<'a> {
         let numbers = b.number.wrapping_sub(a.number);
         let mut sum = WindowTally::default();
         for i in first..self.held {
-            if let Some(frame) = self.frame(i) {
-                sum.add(&frame.tally);
+            if let Some(FrameMark { mut tally, .. }) = self.frame(i) {
+                if i == first {
+                    // Frames without a sample before it are no part of what lies between its frames.
+                    tally.frames = tally.frames.min(1);
+                }
+                sum.add(&tally);
             }
+        }
+        if self.tally != Tally::NONE {
+            // A gap reaches over the window's end.
+            let frames = 0;
+            sum.add(&Tally {
+                frames,
+                ..self.tally
+            });
         }
         // Frames of which no row could be measured came all the same.
         let came = frames.max(sum.frames() as usize);
@@ -456,5 +474,59 @@ mod tests {
             }
             assert_eq!(reports(60, early_ns)[0].lines, 60 * 8, "case {case}");
         }
+    }
+    /// The windows of a second, two a second, that warn of a hand which covered all of frames 75 to 94: those that saw it,
+    /// though no sample of these frames came.
+    #[test]
+    fn frames_without_samples_are_told_of_by_every_window_over_them() {
+        let group = Group::new(Timing::new(1_000_000_000, 0, 8).unwrap(), 2).unwrap();
+        let mut storage = Box::new(StaticStorage::<1024, 128, 8, 2048, 4>::new());
+        let mut reports = ReportSide::new(Config::default(), group, storage.lend()).unwrap();
+        let mut occluded = Vec::new();
+        for frame in 0..241 {
+            let covered = (75..95).contains(&frame);
+            let start_ns = i64::from(frame) * 1_000_000_000 / 60;
+            for slot in 0..group.slots() {
+                let sample = Sample {
+                    frame,
+                    slot,
+                    curvature: Curvature::default(),
+                    time_ns: start_ns + group.middle_ns(slot),
+                    shift_px: 0.01 * ((frame * 7 + u32::from(slot) * 3) % 11) as f32,
+                    information_per_px2: 1e4,
+                    spread: Spread::default(),
+                    vertical: None,
+                };
+                let last = slot + 1 == group.slots();
+                let tally = Tally {
+                    frames: last.into(),
+                    rows: if last { 8 } else { 0 },
+                    occluded: if last && covered { 8 } else { 0 },
+                    ..Tally::NONE
+                };
+                let reading = Reading {
+                    sample: (!covered).then_some(sample),
+                    tally,
+                    frame,
+                };
+                if reports.push(reading) {
+                    occluded.extend(reports.report());
+                }
+            }
+        }
+        assert!(occluded.iter().all(|r| r.lost_frames == 0));
+        let said = occluded
+            .iter()
+            .map(|r| (r.time_ms, r.warnings.contains(Warning::Occluded)));
+        let said: Vec<_> = said.collect();
+        // Frames 75 to 94 are from 1.25 s to 1.58 s; the third window begins at 1 s, the fourth at 1.5 s.
+        let expected = [
+            (1000, false),
+            (1500, true),
+            (2000, true),
+            (2500, true),
+            (3000, false),
+        ];
+        assert_eq!(said[..5], expected);
     }
 }

@@ -29,8 +29,9 @@ pub struct LineSide<'a> {
     /// As they were when they were counted last.
     counted: Counts,
     counted_thin: u32,
-    /// What no reading has taken along yet, and that there is something.
+    /// What no reading has taken along yet, of frames up to this one, and that there is something.
     tally: Tally,
+    ended: u32,
     tally_waits: bool,
 }
 
@@ -52,6 +53,7 @@ impl<'a> LineSide<'a> {
             counted: Counts::default(),
             counted_thin: 0,
             tally: Tally::NONE,
+            ended: 0,
             tally_waits: false,
         })
     }
@@ -71,6 +73,7 @@ impl<'a> LineSide<'a> {
         let mut reading = Reading {
             sample: self.tracker.push_into(line, &mut self.binner),
             tally: Tally::NONE,
+            frame: line.frame,
         };
         reading.sample.as_ref()?;
         if self.tally_waits {
@@ -131,6 +134,7 @@ impl<'a> LineSide<'a> {
         let mut reading = Reading {
             sample: None,
             tally: Tally::NONE,
+            frame: self.ended,
         };
         self.take_tally(&mut reading);
         reading
@@ -201,7 +205,7 @@ impl<'a> LineSide<'a> {
             thin_groups: since(thin.into(), self.counted_thin.into()),
             ..Tally::NONE
         });
-        self.tally_waits = true;
+        (self.ended, self.tally_waits) = (self.frame, true);
         self.counted = now;
         self.counted_thin = thin;
     }
@@ -215,6 +219,7 @@ impl<'a> LineSide<'a> {
     #[inline(never)]
     fn take_tally(&mut self, reading: &mut Reading) {
         reading.tally = core::mem::take(&mut self.tally);
+        reading.frame = self.ended;
         self.tally_waits = false;
     }
 }

@@ -9,6 +9,8 @@ pub struct Reading {
     pub sample: Option<Sample>,
     /// What became of the rows of the frames that ended since the last reading.
     pub tally: Tally,
+    /// Number of the last of these frames.
+    pub frame: u32,
 }
 
 impl From<Sample> for Reading {
@@ -17,6 +19,7 @@ impl From<Sample> for Reading {
         Self {
             sample: Some(sample),
             tally: Tally::NONE,
+            frame: sample.frame,
         }
     }
 }

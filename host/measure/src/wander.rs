@@ -87,6 +87,7 @@ mod tests {
             wander.note_frame(
                 start_ns,
                 &[Reading {
+                    frame,
                     sample: Some(Sample {
                         frame,
                         slot: 0,
