@@ -27,8 +27,7 @@ pub struct LineSide<'a> {
     /// The row of this frame whose light is looked at.
     lit_row: u16,
     /// As they were when they were counted last.
-    counted: Counts,
-    counted_thin: u32,
+    counted: [u32; 7],
     /// What no reading has taken along yet, of frames up to this one, and that there is something.
     tally: Tally,
     ended: u32,
@@ -50,8 +49,7 @@ impl<'a> LineSide<'a> {
             frame: 0,
             in_frame: false,
             lit_row: 0,
-            counted: Counts::default(),
-            counted_thin: 0,
+            counted: [0; 7],
             tally: Tally::NONE,
             ended: 0,
             tally_waits: false,
@@ -168,7 +166,9 @@ impl<'a> LineSide<'a> {
     fn attend(&mut self, line: &Line<'_>) {
         if line.frame != self.frame {
             self.end_frame();
-            self.lit_row = (line.frame % u32::from(self.rows)) as u16;
+            // Another one in every frame, but not its first, which has enough to do.
+            let others = u32::from(self.rows).saturating_sub(1).max(1);
+            self.lit_row = (line.frame % others) as u16 + u16::from(self.rows > 1);
         }
         (self.frame, self.in_frame) = (line.frame, true);
         if line.row != self.lit_row {
@@ -184,16 +184,30 @@ impl<'a> LineSide<'a> {
         if !core::mem::take(&mut self.in_frame) {
             return;
         }
-        let (now, before) = (self.tracker.counts(), self.counted);
-        let since = |now: u64, before: u64| now.wrapping_sub(before).min(u16::MAX.into()) as u16;
-        let measured = since(now.measured, before.measured);
-        let no_texture = since(now.no_texture, before.no_texture);
-        let occluded = since(now.occluded, before.occluded);
-        let unlit = since(now.unlit, before.unlit);
-        let repeated = since(now.repeated, before.repeated);
+        let counts = self.tracker.counts();
+        // A frame has at most 65 535 rows, so the lower halves tell.
+        let now = [
+            counts.measured as u32,
+            counts.no_texture as u32,
+            counts.occluded as u32,
+            counts.unlit as u32,
+            counts.repeated as u32,
+            counts.relearned,
+            self.binner.thin_groups(),
+        ];
+        let before = core::mem::replace(&mut self.counted, now);
+        let since = |i: usize| now[i].wrapping_sub(before[i]).min(u16::MAX.into()) as u16;
+        let [
+            measured,
+            no_texture,
+            occluded,
+            unlit,
+            repeated,
+            relearned,
+            thin_groups,
+        ] = core::array::from_fn(since);
         let outcomes = [measured, no_texture, occluded, unlit, repeated];
         let rows = outcomes.into_iter().fold(0, u16::saturating_add);
-        let thin = self.binner.thin_groups();
         self.tally.add(&Tally {
             frames: 1,
             rows,
@@ -201,13 +215,11 @@ impl<'a> LineSide<'a> {
             occluded,
             unlit,
             repeated_frames: u16::from(repeated > rows / 2),
-            relearned: since(now.relearned.into(), before.relearned.into()),
-            thin_groups: since(thin.into(), self.counted_thin.into()),
+            relearned,
+            thin_groups,
             ..Tally::NONE
         });
         (self.ended, self.tally_waits) = (self.frame, true);
-        self.counted = now;
-        self.counted_thin = thin;
     }
 
     fn read(&mut self, sample: Sample) -> Reading {
