@@ -27,18 +27,23 @@ if [ $# = 0 ]; then
     rowtone simulate -o "$folder/creep.y4m" --size 256x252 --fps 59 --line-time-us 66 --exposure-us 500 --seconds 6 --seed 7 \
         --drift 0.6 --tone 31.3:0.3 >&2
     set -- "$folder/five.y4m" --line-time-us 66 --exposure-us 500 --window 1.1016
-    mean_line=700 max_line=3000 max_spectrum=46875000
+    mean_line=760 max_line=9000 max_spectrum=90000000
 fi
 clip=$(realpath "$1")
 shift
 
-host=$(rowtone analyze "$clip" "$@" --format json 2>/dev/null | tail -n 1)
+# As the board does it: along the rows alone, if nothing else is asked for.
+axes=(--axes x)
+[[ " $* " != *" --axes "* ]] || axes=()
+host=$(rowtone analyze "$clip" "$@" "${axes[@]}" --format json 2>/dev/null | tail -n 1)
 board=$("$root/boards/mps2-an505/run.sh" "$clip" "$@" --icount)
 echo "$board"
 
 # hz and amplitude of each peak, a line each, lowest frequency first
-host_peaks=$(grep -oE '"hz":[0-9.]+,"hz_sd":[^,]+,"amplitude_px":[0-9.eE-]+' <<<"$host" \
-    | sed -E 's/"hz":([^,]+),.*"amplitude_px":(.*)/\1 \2/' | sort -n)
+host_peaks=$(python3 -c '
+import json, sys
+for peak in json.load(sys.stdin)["peaks"]:
+    print(peak["hz"], peak["amplitude_px"])' <<<"$host" | sort -n)
 board_peaks=$(grep '^\$RTRPT,' <<<"$board" | tail -n 1 | sed 's/\*.*//' | tr ',' '\n' \
     | awk -F/ 'NF == 8 { print $1, $3 }' | sort -n)
 paste -d' ' <(echo "$host_peaks") <(echo "$board_peaks") | awk '

@@ -275,12 +275,21 @@ fn a_sky_over_a_swift_picture_is_no_disturbance() {
     let clip = file("fooled-sky.y4m", &common::y4m(config));
     let path = clip.to_str().expect("a plain path");
     let camera = ["--line-time-us", "33.67", "--exposure-us", "200"];
-    let args = [&["analyze", path, "--format", "json"], &camera[..]];
-    let output = command(args.concat()).output().expect("it runs");
-    let report = reports(&texts(&output).0).remove(0);
-    assert!(!has_warning(&report, "occluded"), "{report}");
-    assert!(
-        (amplitude_px(&report, 203.7) / 4.0 - 1.0).abs() < 0.01,
-        "{report}"
-    );
+    for axes in ["x", "xy"] {
+        let args = [
+            &["analyze", path, "--format", "json", "--axes", axes],
+            &camera[..],
+        ];
+        let output = command(args.concat()).output().expect("it runs");
+        let report = reports(&texts(&output).0).remove(0);
+        // Along both axes some rows are still rejected as occluded: a known fault (docs/results.md).
+        assert!(
+            axes == "xy" || !has_warning(&report, "occluded"),
+            "{report}"
+        );
+        assert!(
+            (amplitude_px(&report, 203.7) / 4.0 - 1.0).abs() < 0.01,
+            "{axes}: {report}"
+        );
+    }
 }
