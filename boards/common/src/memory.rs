@@ -7,7 +7,7 @@ use rowtone::spectrum::StaticStorage;
 use rowtone::timeline;
 
 /// Samples of a window.
-pub const SAMPLES: usize = 4096;
+pub const SAMPLES: usize = 3072;
 /// Frames of a window.
 pub const FRAMES: usize = 96;
 /// Samples of a frame.

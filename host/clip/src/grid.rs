@@ -79,7 +79,7 @@ pub enum Rounding {
 /// let Rounding::Grid(grid, numbers) = rounding(&times) else { panic!() };
 /// assert_eq!(numbers[239], 239);
 /// assert!((grid.period_ns * 60.0 - 1e9).abs() < 1e5);
-/// assert_eq!(rounding(&[0, 16_666_667, 33_333_333]), Rounding::Fine);
+/// assert_eq!(rounding(&[0, 16_666_667, 33_333_334, 50_000_021]), Rounding::Fine);
 /// ```
 pub fn rounding(times_ns: &[i64]) -> Rounding {
     let Some(unit) = unit_of(times_ns) else {

@@ -212,7 +212,7 @@ fn to_string(
 mod tests {
     use super::Place;
     use crate::example;
-    use rowtone::report::{Motion, PeakShape, ShapeRow};
+    use rowtone::report::{FloorPoint, Motion, PeakShape, ShapeRow};
 
     #[test]
     fn the_keys_are_the_contract() {
@@ -232,6 +232,11 @@ mod tests {
     fn what_was_measured_here_has_its_motion_and_its_shape() {
         let mut report = example(None);
         report.peaks.truncate(1);
+        let floor = FloorPoint {
+            to_hz: 400.0,
+            px_per_sqrt_hz: 0.001,
+        };
+        report.noise_floor = [floor].into_iter().collect();
         report.peaks[0].motion = Some(Motion {
             x_px: Some(0.3998),
             x_px_sd: Some(0.0002),
