@@ -47,4 +47,3 @@ echo "core 1: $used bytes of stack at most, a panic included, of 73728"
 [ "$used" -le 73728 ] || { echo "boards/ci.sh: core 1's stack is too small" >&2; exit 1; }
 
 boards/mps2-an505/kernel.sh
-boards/mps2-an505/agree.sh
