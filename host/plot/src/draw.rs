@@ -5,7 +5,8 @@ use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 use rowtone::report::Report;
 
-use super::file::{DrawError, Drawing};
+use super::error::DrawError;
+use super::file::Drawing;
 use super::residual::Fit;
 use super::spectrogram::Spectrogram;
 use rowtone_report::text::digits;

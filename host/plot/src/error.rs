@@ -4,7 +4,8 @@ use std::fmt;
 use std::io;
 use std::path::PathBuf;
 
-use crate::file::DrawError;
+/// What drawing says when it cannot.
+pub type DrawError = Box<dyn std::error::Error>;
 
 /// Why there is no picture. The text is one line that names the file.
 #[derive(Debug)]

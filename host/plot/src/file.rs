@@ -6,13 +6,10 @@ use plotters::coord::Shift;
 use plotters::prelude::{DrawingArea, DrawingBackend, IntoDrawingArea, SVGBackend};
 
 use crate::canvas::{Canvas, Pen};
-use crate::error::PlotError;
+use crate::error::{DrawError, PlotError};
 
 /// Pixels of a PNG for one unit of the drawing.
 const SCALE: f32 = 1.5;
-
-/// What drawing says when it cannot.
-pub type DrawError = Box<dyn std::error::Error>;
 
 /// Something that plotters draws, on whatever backend.
 pub trait Drawing {

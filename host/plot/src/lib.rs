@@ -17,8 +17,8 @@ use std::path::PathBuf;
 use rowtone::report::Report;
 use rowtone::timeline::Sample;
 
-pub use error::PlotError;
-pub use file::{DrawError, Drawing, check_ending, png, svg, write};
+pub use error::{DrawError, PlotError};
+pub use file::{Drawing, check_ending, png, svg, write};
 
 use self::residual::Fit;
 use self::spectrogram::Spectrogram;

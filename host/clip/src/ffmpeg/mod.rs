@@ -20,11 +20,13 @@ mod error;
 mod luma;
 pub mod probe;
 mod programs;
+mod ratio;
 pub mod showinfo;
 mod video;
 
 pub use error::Error;
 pub use luma::Luma;
 pub use probe::{Probe, probe};
+pub use ratio::Ratio;
 pub use showinfo::{FrameKind, Shown};
 pub use video::Video;

@@ -10,7 +10,7 @@
 //! Lines of side data may stand between them; keys are looked for by name, since versions of ffmpeg
 //! differ in which there are.
 
-use super::probe::Ratio;
+use super::Ratio;
 
 /// How a picture was coded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

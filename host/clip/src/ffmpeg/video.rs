@@ -5,8 +5,7 @@ use std::path::{Path, PathBuf};
 use super::decoder::Decoder;
 use super::programs::{Dialect, without_name};
 use super::showinfo::{Said, Shown};
-use super::{Error, Luma, Probe};
-use crate::ffmpeg::probe::Ratio;
+use super::{Error, Luma, Probe, Ratio};
 
 /// A video file that is being decoded.
 #[derive(Debug)]
