@@ -1,12 +1,14 @@
 //! The command `rowtone`: its commands and what they print.
 //!
 //! - [`commands`]: one file a command, each with its options and what it does;
+//! - [`failure`]: why a command stopped: one line and an exit status;
 //! - [`output`]: displacements as files, standard output line by line, progress;
 //! - [`stop`]: what a signal does;
 //! - `terminal`: a screen of text for the live view.
 
+mod camera_args;
 pub mod commands;
-mod failures;
+pub mod failure;
 pub mod output;
 pub mod stop;
 mod terminal;

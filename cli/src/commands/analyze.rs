@@ -8,11 +8,11 @@ use rowtone::report::{MAX_PEAKS, PeakShape, Report, Warnings};
 use rowtone::tracker::Axes;
 use rowtone::wire::{Message, text as wire_text};
 
-use crate::failures;
+use crate::camera_args::CameraArgs;
+use crate::failure::Failure;
 use crate::output::Out;
 use crate::output::progress::Progress;
-use rowtone_clip::{CameraArgs, Feed};
-use rowtone_failure::Failure;
+use rowtone_clip::Feed;
 use rowtone_files::WholeFile;
 use rowtone_measure::analysis::{Analysis, Event, Plan, Settings};
 use rowtone_measure::tracking::Shifts;
@@ -99,17 +99,18 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     }
     // What cannot be written is said before anything is measured.
     if let Some(path) = &args.plot {
-        rowtone_plot::check_ending(path).map_err(failures::plot)?;
+        rowtone_plot::check_ending(path)?;
         WholeFile::check(path).map_err(|e| Failure::writing(&path.display().to_string(), &e))?;
     }
+    let options = args.camera.options();
     let session = session();
     let serial = args.serial.as_ref().map(|port| {
         // What comes through a pipe may be live, and does not wait.
-        let may_wait = !args.camera.is_pipe();
+        let may_wait = !options.is_pipe();
         Sender::open(port, session, &as_a_board_says(args), may_wait)
     });
-    let serial = serial.transpose().map_err(failures::serial)?;
-    let mut feed = Feed::open(&args.camera)?;
+    let serial = serial.transpose()?;
+    let mut feed = Feed::open(&options)?;
     feed.stop_when(crate::stop::on_signals());
     let plan = Plan::new(
         &feed.camera,
@@ -144,6 +145,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             },
         },
         format: args.format,
+        name: shifts.name.clone(),
         zone_limits: args.zone_limits,
         warnings: shifts.camera.warnings,
         progress: Progress::new(shifts.frames),
@@ -166,7 +168,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let closed = outlets.close();
     outcome.and(closed)?;
     if nothing {
-        return Err(analysis.nothing_measured());
+        return Err(analysis.nothing_measured().into());
     }
     Ok(())
 }
@@ -201,6 +203,8 @@ fn session() -> u32 {
 struct Outlets {
     place: Place,
     format: Format,
+    /// What the recording is called in messages.
+    name: String,
     zone_limits: Option<ZoneLimits>,
     /// What the recording itself warns of.
     warnings: Warnings,
@@ -216,6 +220,7 @@ impl Outlets {
     fn hear(&mut self, event: Event<'_>) -> Result<(), Failure> {
         match event {
             Event::Part(part) => self.place.roi = [part.x, part.y, part.width, part.height],
+            Event::Note(note) => self.progress.note(&format!("{}: {note}", self.name)),
             Event::Frame(start_ns) => {
                 self.progress.step();
                 if let Some(picture) = &mut self.picture {
@@ -287,8 +292,8 @@ impl Outlets {
     fn close(self) -> Result<(), Failure> {
         let drawn = self.picture.map_or(Ok(()), |picture| picture.save());
         let sent = self.serial.map_or(Ok(None), Sender::finish);
-        drawn.map_err(failures::plot)?;
-        if let Some(note) = sent.map_err(failures::serial)? {
+        drawn?;
+        if let Some(note) = sent? {
             self.progress.note(&note);
         }
         Ok(())

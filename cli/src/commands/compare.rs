@@ -5,9 +5,8 @@ use std::path::PathBuf;
 
 use rowtone::camera::Timing;
 
-use crate::failures;
+use crate::failure::Failure;
 use host_sim::{Config, Scene, Tone};
-use rowtone_failure::Failure;
 use rowtone_lab::methods::core::Core;
 use rowtone_lab::methods::study::{Score, record, score};
 use rowtone_lab::methods::summary::{self, Summary};
@@ -88,7 +87,7 @@ fn size(text: &str) -> Result<(u32, u32), String> {
 /// [`Failure::Usage`] for a clip that cannot be simulated.
 pub fn run(args: &Args) -> Result<(), Failure> {
     if let Some(path) = &args.plot {
-        rowtone_plot::check_ending(path).map_err(failures::plot)?;
+        rowtone_plot::check_ending(path)?;
     }
     let looks = if args.scene.is_empty() {
         &Look::ALL[..]
@@ -112,7 +111,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         scenes.push((look.name().to_owned(), summaries));
     }
     if let Some(path) = &args.plot {
-        rowtone_plot::write(path, &summary::figure(&scenes)).map_err(failures::plot)?;
+        rowtone_plot::write(path, &summary::figure(&scenes))?;
     }
     let title = format!(
         "{}x{}, {} frames at 60 fps, {} Hz, {} px, seeds {} to {}\n\n",

@@ -8,11 +8,11 @@ use std::io::{self, BufWriter, PipeWriter, Write};
 use rowtone::report::Report;
 use rowtone::wire::{Message, text as wire_text};
 
+use crate::failure::Failure;
 use crate::output::Out;
 use crate::output::progress::Progress;
 use host_sim::{Config, Tone, y4m};
-use rowtone_clip::{CameraArgs, Feed};
-use rowtone_failure::Failure;
+use rowtone_clip::{CameraOptions, Feed};
 use rowtone_measure::analysis::{Analysis, Event, Plan, Settings};
 use rowtone_measure::tracking::Shifts;
 use rowtone_report::text::digits;
@@ -74,10 +74,10 @@ pub fn run(_args: &Args) -> Result<(), Failure> {
         sensor.fps,
         sensor.line_time_ps / 1_000_000,
     ))?;
-    let options = CameraArgs {
+    let options = CameraOptions {
         line_time_us: Some(f64::from(sensor.line_time_ps) * 1e-6),
         exposure_us: Some(f64::from(sensor.exposure_ns) * 1e-3),
-        ..CameraArgs::of("the simulated camera")
+        ..CameraOptions::of("the simulated camera")
     };
     let feed = Feed::read(&options, from)?;
     let settings = Settings {
@@ -92,6 +92,7 @@ pub fn run(_args: &Args) -> Result<(), Failure> {
     analysis.run(|event| {
         match event {
             Event::Part(_) => {}
+            Event::Note(note) => progress.note(note),
             Event::Frame(_) => progress.step(),
             Event::Sample(_) => {}
             Event::Report(report, _) => progress.aside(|| show(report, &mut out))?,

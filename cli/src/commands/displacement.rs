@@ -6,11 +6,12 @@ use std::path::{Path, PathBuf};
 use clap::ValueEnum;
 use rowtone::timeline::{Displacement, Vertical};
 
+use crate::camera_args::CameraArgs;
+use crate::failure::Failure;
 use crate::output::progress::Progress;
 use crate::output::series::{Measured, Series, Shift};
 use crate::output::wav;
-use rowtone_clip::{Camera, CameraArgs, Feed};
-use rowtone_failure::Failure;
+use rowtone_clip::{Camera, Feed};
 use rowtone_files::WholeFile;
 use rowtone_measure::restore::Method;
 use rowtone_measure::restore::long::{Restoration, USUAL_CORNER_HZ};
@@ -126,7 +127,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             "--fill and --low-pass-hz are for WAV: CSV and NPY hold what was measured",
         ));
     }
-    let mut feed = Feed::open(&args.camera)?;
+    let mut feed = Feed::open(&args.camera.options())?;
     feed.stop_when(crate::stop::on_signals());
     let mut shifts = Shifts::start(feed, None)?;
     let rows_per_sample = rows_per_sample(args.rows_per_sample, &shifts);
@@ -156,7 +157,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             eprintln!("rowtone: {}: {note}", shifts.name);
         }
         if series.measured() == 0 {
-            return outcome.and(Err(shifts.nothing_measured()));
+            return outcome.and(Err(shifts.nothing_measured().into()));
         }
     }
     outcome
@@ -188,6 +189,9 @@ fn collect(shifts: &mut Shifts, series: &mut Series) -> Result<(), Failure> {
     let progress = Progress::new(shifts.frames);
     let mut samples = Vec::new();
     while let Some(frame) = shifts.next_frame()? {
+        for note in &frame.notes {
+            progress.note(&format!("{}: {note}", shifts.name));
+        }
         combine(&frame, shifts, series.rows_per_sample(), &mut samples);
         series.push_frame(frame.start_ns, &samples);
         shifts.recycle(frame);

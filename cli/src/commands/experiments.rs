@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use rowtone_failure::Failure;
+use crate::failure::Failure;
 use rowtone_lab::experiments::{Folder, Scale, chirp, far, highspeed, phone, tones, voices};
 use rowtone_lab::sound::{sounds, table};
 use rowtone_measure::restore::Method;

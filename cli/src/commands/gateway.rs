@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
-use rowtone_failure::Failure;
+use crate::failure::Failure;
 use rowtone_gateway::{Config, GatewayError, Totals, run as run_gateway};
 
 /// Options of `rowtone gateway`.

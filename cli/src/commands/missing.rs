@@ -2,7 +2,7 @@
 
 use std::ffi::OsString;
 
-use rowtone_failure::Failure;
+use crate::failure::Failure;
 
 /// Whatever stands behind a command that is left out, its `--help` too.
 #[derive(Debug, clap::Args)]

@@ -10,7 +10,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
-use rowtone_failure::Failure;
+use crate::failure::Failure;
 
 pub mod analyze;
 pub mod calibrate;

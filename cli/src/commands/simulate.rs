@@ -10,9 +10,9 @@ use std::sync::atomic::Ordering;
 
 pub use options::Args;
 
+use crate::failure::Failure;
 use crate::output::progress::Progress;
 use host_sim::{Camera, SimError, Truth, parallel, y4m};
-use rowtone_failure::Failure;
 use rowtone_files::WholeFile;
 
 /// Makes the recording.

@@ -2,8 +2,8 @@
 
 use std::io::Write;
 
+use crate::failure::Failure;
 use crate::output::Out;
-use rowtone_failure::Failure;
 use rowtone_lab::calibrations;
 use rowtone_lab::line_scenes::{case, region, slips, table as line_table};
 use rowtone_lab::spectrum_scenes::score::Score;

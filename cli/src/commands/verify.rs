@@ -5,9 +5,9 @@ mod truth;
 
 use std::path::{Path, PathBuf};
 
+use crate::failure::Failure;
 use rowtone::report::Report;
-use rowtone_clip::{CameraArgs, Feed};
-use rowtone_failure::Failure;
+use rowtone_clip::{CameraOptions, Feed};
 use rowtone_measure::analysis::{Analysis, Event, Plan, Settings};
 use rowtone_measure::tracking::Shifts;
 
@@ -107,28 +107,26 @@ fn descriptions(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
 /// The reports on a recording. One in which nothing could be measured has none.
 fn measure(folder: &Path, truth: &Truth) -> Result<Vec<Report>, Failure> {
     let clip = folder.join(&truth.clip);
-    let options = CameraArgs {
+    let options = CameraOptions {
         fps: truth.fps,
         line_time_us: truth.line_time_us,
         global_shutter: truth.global_shutter,
         exposure_us: truth.exposure_us,
         roi: truth.roi()?,
-        ..CameraArgs::of(&clip.display().to_string())
+        ..CameraOptions::of(&clip.display().to_string())
     };
-    let mut feed = Feed::open(&options)?;
-    // What is said of every recording would stand between the lines of the table.
-    feed.notes.clear();
+    let feed = Feed::open(&options)?;
     let plan = Plan::new(&feed.camera, &Settings::default())?;
-    let mut shifts = Shifts::start(feed, Some(plan.groups()))?;
-    shifts.quiet = true;
+    let shifts = Shifts::start(feed, Some(plan.groups()))?;
     let mut memory = plan.memory();
     let mut analysis = Analysis::new(shifts, &plan, &mut memory)?;
     let mut reports = Vec::new();
+    // Notes would stand between the lines of the table.
     analysis.run(|event| {
         if let Event::Report(report, _) = event {
             reports.push(report.clone());
         }
-        Ok(())
+        Ok::<(), Failure>(())
     })?;
     Ok(reports)
 }

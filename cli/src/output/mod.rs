@@ -9,7 +9,7 @@ pub mod wav;
 
 use std::io::{self, Write};
 
-use rowtone_failure::Failure;
+use crate::failure::Failure;
 
 /// Standard output, line by line.
 #[derive(Debug)]

@@ -8,9 +8,12 @@
 //! - [`sound`]: speech and music, and how well a recovered sound agrees with them.
 
 pub mod calibrations;
+mod error;
 pub mod experiments;
 pub mod figure;
 pub mod line_scenes;
 pub mod methods;
 pub mod sound;
 pub mod spectrum_scenes;
+
+pub use error::LabError;

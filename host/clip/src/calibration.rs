@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use rowtone_calibrate::{Calibration, file::RollingName};
-use rowtone_failure::Failure;
+
+use super::ClipError;
 
 /// What a calibration file says about the timing.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,10 +20,12 @@ pub(super) struct Calibrated {
 /// Reads a calibration file.
 ///
 /// # Errors
-/// [`Failure::Input`] when it cannot be read or used.
-pub(super) fn read(path: &Path) -> Result<Calibrated, Failure> {
-    let calibration = Calibration::read(path)
-        .map_err(|error| Failure::input(format!("{}: {error}", path.display())))?;
+/// [`ClipError::Calibration`] when it cannot be read or used.
+pub(super) fn read(path: &Path) -> Result<Calibrated, ClipError> {
+    let calibration = Calibration::read(path).map_err(|why| ClipError::Calibration {
+        path: path.display().to_string(),
+        why,
+    })?;
     Ok(Calibrated {
         line_time_s: calibration.line_time_s,
         exposure_s: calibration.exposure_s,

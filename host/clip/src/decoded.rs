@@ -2,13 +2,12 @@
 
 use std::path::Path;
 
-use rowtone_failure::Failure;
-
 use super::bytes::Bytes;
+use super::error::InputError;
 use super::ffmpeg::{self, Luma, Probe, Video};
+use super::frame_read::Next;
 use super::source::{Coding, FrameSource, Stamp};
-use super::y4m::Next;
-use super::{Header, PixelFormat};
+use super::{ClipError, Header, PixelFormat};
 
 /// A video file that ffmpeg decodes.
 #[derive(Debug)]
@@ -24,9 +23,9 @@ impl Decoded {
     /// Starts decoding a file that ffprobe has looked at. `name` stands in front of every message.
     ///
     /// # Errors
-    /// [`Failure::Input`] when ffmpeg cannot.
-    pub(super) fn open(path: &Path, name: &str, probe: &Probe) -> Result<Self, Failure> {
-        let video = Video::open(path, probe).map_err(|error| failure(name, &error))?;
+    /// [`ClipError::Input`] when ffmpeg cannot.
+    pub(super) fn open(path: &Path, name: &str, probe: &Probe) -> Result<Self, ClipError> {
+        let video = Video::open(path, probe).map_err(|error| refused(name, error))?;
         Ok(Self {
             header: Header {
                 width: probe.width.into(),
@@ -48,11 +47,11 @@ impl FrameSource for Decoded {
         &self.header
     }
 
-    fn next_frame(&mut self, bytes: &mut Bytes) -> Result<Next, Failure> {
+    fn next_frame(&mut self, bytes: &mut Bytes) -> Result<Next, ClipError> {
         let shown = self
             .video
             .next_frame(bytes.buffer())
-            .map_err(|error| failure(&self.name, &error))?;
+            .map_err(|error| refused(&self.name, error))?;
         let Some(shown) = shown else {
             self.warning = self.video.warning();
             return Ok(Next::End);
@@ -73,12 +72,11 @@ impl FrameSource for Decoded {
     }
 
     fn warning(&self) -> Option<String> {
-        let warning = self.warning.as_deref()?;
-        Some(format!("{}: {warning}", self.name))
+        self.warning.clone()
     }
 }
 
 /// The file's name in front.
-pub(super) fn failure(name: &str, error: &ffmpeg::Error) -> Failure {
-    Failure::input(format!("{name}: {error}"))
+pub(super) fn refused(name: &str, error: ffmpeg::Error) -> ClipError {
+    ClipError::input(name, InputError::Ffmpeg(error))
 }

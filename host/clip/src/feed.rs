@@ -10,12 +10,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use super::clock::{Clock, Times};
+use super::error::InputError;
+use super::frame_read::Next;
+use super::pts::PtsError;
 use super::recording::{About, Recording};
 use super::source::FrameSource;
-use super::y4m::Next;
-use super::{Camera, CameraArgs, Frame, Turn};
+use super::{Camera, CameraOptions, ClipError, Frame, Turn};
 use crate::ring::{Inlet, Next as Arrival, Outlet, ring};
-use rowtone_failure::Failure;
 
 /// Frames of a file ahead of the lines, bytes of luma: enough for the millisecond or two in which the reading thread's
 /// processor computes a report.
@@ -36,10 +37,10 @@ const ASKED_EVERY: Duration = Duration::from_millis(100);
 enum Ending {
     /// At the end of the file; with something to tell the user.
     End(Option<String>),
-    /// Inside a frame; the frames before it are good.
-    Truncated(String),
+    /// Inside a frame: this many bytes of those it should have. The frames before it are good.
+    Truncated { have: usize, need: usize },
     /// It could not go on.
-    Failed(Failure),
+    Failed(ClipError),
 }
 
 /// The frames of a recording, in order.
@@ -58,6 +59,8 @@ pub struct Feed {
     pub notes: Vec<String>,
     warning: Option<String>,
     delivered: u64,
+    /// Columns and rows of a frame as it is stored.
+    size: (usize, usize),
     stop: Option<Arc<AtomicBool>>,
 }
 
@@ -65,8 +68,8 @@ impl Feed {
     /// Opens the input, reads its header, checks the options against it and starts the reading thread.
     ///
     /// # Errors
-    /// [`Failure`] for options or an input that cannot be used.
-    pub fn open(args: &CameraArgs) -> Result<Self, Failure> {
+    /// [`ClipError`] for options or an input that cannot be used.
+    pub fn open(args: &CameraOptions) -> Result<Self, ClipError> {
         args.check()?;
         Self::start(args, Recording::open(&args.input, args.name())?, None)
     }
@@ -75,7 +78,7 @@ impl Feed {
     ///
     /// # Errors
     /// As [`Feed::open`].
-    pub fn read(args: &CameraArgs, from: impl Read + Send + 'static) -> Result<Self, Failure> {
+    pub fn read(args: &CameraOptions, from: impl Read + Send + 'static) -> Result<Self, ClipError> {
         args.check()?;
         Self::start(args, Recording::read(from, args.name())?, None)
     }
@@ -85,10 +88,10 @@ impl Feed {
     /// # Errors
     /// As [`Feed::open`].
     pub fn at_times(
-        args: &CameraArgs,
+        args: &CameraOptions,
         from: impl Read + Send + 'static,
         times: Times,
-    ) -> Result<Self, Failure> {
+    ) -> Result<Self, ClipError> {
         args.check()?;
         let mut recording = Recording::read(from, args.name())?;
         recording.about.frames = Some(times.len() as u64);
@@ -97,10 +100,10 @@ impl Feed {
 
     /// Starts the reading thread. `clock`: the frames' times, where `args` do not say.
     fn start(
-        args: &CameraArgs,
+        args: &CameraOptions,
         recording: Recording,
         clock: Option<Clock>,
-    ) -> Result<Self, Failure> {
+    ) -> Result<Self, ClipError> {
         let Recording { source, about } = recording;
         let name = args.name().to_owned();
         let clock = match clock {
@@ -110,6 +113,7 @@ impl Feed {
         let camera = args.camera(source.header(), &clock)?;
         let notes = args.notes(source.header(), &about);
         let frames = about.frames;
+        let size = (source.header().width, source.header().height);
         let ahead = match frames {
             Some(_) => AHEAD_BYTES / source.header().luma_bytes(),
             None => LEAST_AHEAD,
@@ -137,6 +141,7 @@ impl Feed {
             about,
             warning: None,
             delivered: 0,
+            size,
             stop: None,
         })
     }
@@ -149,9 +154,9 @@ impl Feed {
     /// The next frame; `None` after the last.
     ///
     /// # Errors
-    /// [`Failure::Input`] when the input turns out to be unusable at this point: the frames before it
+    /// [`ClipError::Input`] when the input turns out to be unusable at this point: the frames before it
     /// were good. A recording without any frame is unusable.
-    pub fn next_frame(&mut self) -> Result<Option<Frame>, Failure> {
+    pub fn next_frame(&mut self) -> Result<Option<Frame>, ClipError> {
         let stopped = || {
             self.stop
                 .as_ref()
@@ -171,39 +176,49 @@ impl Feed {
                 if self.delivered == 2
                     && let Some(doubt) = self.camera.doubt.take()
                 {
-                    return Err(doubt);
+                    return Err(doubt.into());
                 }
                 Ok(Some(frame))
             }
-            Arrival::End(Ending::Failed(failure)) => Err(failure),
-            Arrival::End(Ending::Truncated(text)) if self.delivered > 0 => {
-                self.warning = Some(text);
+            Arrival::End(Ending::Failed(error)) => Err(error),
+            Arrival::End(Ending::Truncated { have, need }) if self.delivered > 0 => {
+                self.warning = Some(format!(
+                    "{}: the last frame is cut off ({have} of {need} bytes): the {} before it are \
+                     used",
+                    self.name, self.delivered
+                ));
                 Ok(None)
             }
-            Arrival::End(Ending::Truncated(text)) => Err(Failure::input(text)),
+            Arrival::End(Ending::Truncated { have, need }) => {
+                let (width, height) = self.size;
+                let why = InputError::FirstFrameCut {
+                    have,
+                    need,
+                    width,
+                    height,
+                };
+                Err(ClipError::input(&self.name, why))
+            }
             Arrival::End(Ending::End(warning)) if self.delivered > 0 => {
-                self.warning = warning;
+                self.warning = warning.map(|warning| format!("{}: {warning}", self.name));
                 Ok(None)
             }
             Arrival::Gone if self.delivered > 0 => Ok(None),
-            Arrival::End(Ending::End(warning)) => {
-                Err(Failure::input(warning.unwrap_or_else(|| {
-                    format!("{}: there is no frame in it", self.name)
-                })))
+            Arrival::End(Ending::End(complaint)) => Err(ClipError::input(
+                &self.name,
+                InputError::NoFrame { complaint },
+            )),
+            Arrival::Gone => {
+                let why = InputError::NoFrame { complaint: None };
+                Err(ClipError::input(&self.name, why))
             }
-            Arrival::Gone => Err(Failure::input(format!(
-                "{}: there is no frame in it",
-                self.name
-            ))),
         }
     }
 
     /// What is wrong with a frame that was cut off while it was read.
-    pub fn cut_short(&self, frame: &Frame) -> Failure {
-        Failure::input(format!(
-            "{}: was cut short by another program while it was read, at frame {}",
-            self.name, frame.number
-        ))
+    pub fn cut_short(&self, frame: &Frame) -> ClipError {
+        let frame = frame.number;
+        ClipError::input(&self.name, InputError::CutWhileRead { frame })
     }
 
     /// Gives a frame's buffers back. A frame that is kept is replaced by a new one.
@@ -242,16 +257,14 @@ impl Reading {
                     || Ending::End(self.source.warning()),
                     |have| Ending::Failed(self.too_many_times(have, index)),
                 ),
-                Ok(Next::Truncated { have, need }) => {
-                    Ending::Truncated(self.truncated(index, have, need))
-                }
-                Err(failure) => Ending::Failed(failure),
+                Ok(Next::Truncated { have, need }) => Ending::Truncated { have, need },
+                Err(error) => Ending::Failed(error),
             };
             return to.end(ending);
         }
     }
 
-    fn read(&mut self, index: u64, frame: &mut Frame) -> Result<Next, Failure> {
+    fn read(&mut self, index: u64, frame: &mut Frame) -> Result<Next, ClipError> {
         let next = self.source.next_frame(&mut frame.raw)?;
         if let Next::Frame { luma } = next {
             self.check_times(index)?;
@@ -266,7 +279,7 @@ impl Reading {
     }
 
     /// Every frame has a time. With the first frame it is already clear whether the whole file has.
-    fn check_times(&self, index: u64) -> Result<(), Failure> {
+    fn check_times(&self, index: u64) -> Result<(), ClipError> {
         let Clock::Times(times) = &self.clock else {
             return Ok(());
         };
@@ -284,15 +297,12 @@ impl Reading {
         if need <= have {
             return Ok(());
         }
-        let at_least = if self.frames.is_some() {
-            ""
-        } else {
-            "at least "
-        };
-        Err(Failure::input(format!(
-            "{}: only {have} times for {at_least}{need} frames of {}: every frame needs its own",
-            self.pts, self.name
-        )))
+        Err(self.times(PtsError::TooFew {
+            have,
+            need,
+            at_least: self.frames.is_none(),
+            recording: self.name.clone(),
+        }))
     }
 
     /// How many times there are, where the recording has ended after `frames` frames and has fewer.
@@ -305,27 +315,19 @@ impl Reading {
         }
     }
 
-    fn too_many_times(&self, have: u64, frames: u64) -> Failure {
-        Failure::input(format!(
-            "{}: {have} times for the {frames} frames of {}: which frames are missing is not known, so \
-             no time is sure",
-            self.pts, self.name
-        ))
+    fn too_many_times(&self, have: u64, frames: u64) -> ClipError {
+        self.times(PtsError::TooMany {
+            have,
+            frames,
+            recording: self.name.clone(),
+        })
     }
 
-    fn truncated(&self, index: u64, have: usize, need: usize) -> String {
-        let size = self.source.header();
-        if index == 0 {
-            format!(
-                "{}: not even one frame: {have} bytes where a frame of {}x{} has {need}",
-                self.name, size.width, size.height
-            )
-        } else {
-            format!(
-                "{}: the last frame is cut off ({have} of {need} bytes): the {index} before it are \
-                 used",
-                self.name
-            )
+    /// Something is wrong with the file of times.
+    fn times(&self, why: PtsError) -> ClipError {
+        ClipError::Times {
+            path: self.pts.clone(),
+            why,
         }
     }
 }

@@ -1,5 +1,6 @@
 //! The header of a Y4M file: its first line.
 
+use std::fmt;
 use std::io::{self, Write};
 
 use super::PixelFormat;
@@ -26,25 +27,16 @@ impl Header {
     /// Reads the header's line, without its line feed.
     ///
     /// # Errors
-    /// What is wrong with it, in words.
-    pub fn parse(line: &[u8]) -> Result<Self, String> {
-        let not_y4m = || {
-            "not a Y4M file (it does not start with YUV4MPEG2): give the video file itself, or pipe it as \
-             `ffmpeg -i FILE -f yuv4mpegpipe -strict -1 -` does"
-                .to_owned()
-        };
+    /// What is wrong with it.
+    pub fn parse(line: &[u8]) -> Result<Self, HeaderError> {
         // Only a comment (X) may hold other characters, in whatever encoding.
         let text = String::from_utf8_lossy(line);
         if text.ends_with('\r') && line.starts_with(MAGIC) {
-            return Err(
-                "its header ends with a carriage return (CRLF line end): the file was copied as text, \
-                 which harms its pixels too; copy it again, as it is (binary)"
-                    .to_owned(),
-            );
+            return Err(HeaderError::CopiedAsText);
         }
         let mut words = text.split(' ');
         if words.next().map(str::as_bytes) != Some(MAGIC) {
-            return Err(not_y4m());
+            return Err(HeaderError::NotY4m);
         }
         let (mut width, mut height, mut fps) = (None, None, None);
         let mut unusable_rate = None;
@@ -63,18 +55,11 @@ impl Header {
                     unusable_rate = (fps.is_none() && !is_unknown).then(|| value.to_owned());
                 }
                 'I' if matches!(value, "t" | "b" | "m") => {
-                    return Err(format!(
-                        "the video is interlaced (I{value}): its rows are out of time order; \
-                         record it progressive"
-                    ));
+                    return Err(HeaderError::Interlaced(value.to_owned()));
                 }
                 'C' => {
-                    format = PixelFormat::from_tag(value).ok_or_else(|| {
-                        format!(
-                            "the colour tag C{value} is not known: convert it with \
-                             `ffmpeg -pix_fmt gray`"
-                        )
-                    })?;
+                    format = PixelFormat::from_tag(value)
+                        .ok_or_else(|| HeaderError::Colour(value.to_owned()))?;
                 }
                 _ => {}
             }
@@ -87,7 +72,7 @@ impl Header {
                 unusable_rate,
                 format,
             }),
-            _ => Err("the header gives no usable size (W and H, 1 to 65535 each)".to_owned()),
+            _ => Err(HeaderError::Size),
         }
     }
 
@@ -111,12 +96,63 @@ impl Header {
     }
 
     /// Bytes of the planes of one frame.
-    pub(super) fn frame_bytes(&self) -> Result<usize, String> {
+    pub(super) fn frame_bytes(&self) -> Result<usize, HeaderError> {
         self.format
             .frame_bytes(self.width, self.height)
-            .ok_or_else(|| "a frame is larger than this machine's memory".to_owned())
+            .ok_or(HeaderError::TooLarge)
     }
 }
+
+/// Why the header of a Y4M file cannot be used.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum HeaderError {
+    /// The file does not start as a Y4M file does.
+    NotY4m,
+    /// Its line ends with CRLF: it was copied as text.
+    CopiedAsText,
+    /// Its fields were exposed one after the other; the letter is the header's word for their order.
+    Interlaced(String),
+    /// A colour tag that is not known.
+    Colour(String),
+    /// No width and height from 1 to 65 535.
+    Size,
+    /// A frame does not fit into this machine's memory.
+    TooLarge,
+    /// Its line is longer than this many bytes.
+    TooLong(usize),
+    /// The file ends inside of it.
+    Ended,
+}
+
+impl fmt::Display for HeaderError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NotY4m => f.write_str(
+                "not a Y4M file (it does not start with YUV4MPEG2): give the video file itself, \
+                 or pipe it as `ffmpeg -i FILE -f yuv4mpegpipe -strict -1 -` does",
+            ),
+            Self::CopiedAsText => f.write_str(
+                "its header ends with a carriage return (CRLF line end): the file was copied as \
+                 text, which harms its pixels too; copy it again, as it is (binary)",
+            ),
+            Self::Interlaced(order) => write!(
+                f,
+                "the video is interlaced (I{order}): its rows are out of time order; record it \
+                 progressive"
+            ),
+            Self::Colour(tag) => write!(
+                f,
+                "the colour tag C{tag} is not known: convert it with `ffmpeg -pix_fmt gray`"
+            ),
+            Self::Size => f.write_str("the header gives no usable size (W and H, 1 to 65535 each)"),
+            Self::TooLarge => f.write_str("a frame is larger than this machine's memory"),
+            Self::TooLong(bytes) => write!(f, "its header is longer than {bytes} bytes"),
+            Self::Ended => f.write_str("the file ends inside its header"),
+        }
+    }
+}
+
+impl std::error::Error for HeaderError {}
 
 /// A frame rate as a ratio of whole numbers, to a part in 10⁹ or better below 2000 Hz.
 fn rate(fps: f64) -> (u64, u64) {
@@ -134,11 +170,11 @@ fn rate(fps: f64) -> (u64, u64) {
 fn ratio(text: &str) -> Option<f64> {
     let (numerator, denominator) = text.split_once(':')?;
     let fps = numerator.parse::<u64>().ok()? as f64 / denominator.parse::<u64>().ok()? as f64;
-    FPS.contains(&fps).then_some(fps)
+    FRAME_RATES_HZ.contains(&fps).then_some(fps)
 }
 
 /// Frame rates that can be measured at, Hz.
-pub(super) const FPS: std::ops::RangeInclusive<f64> = 1e-3..=1e7;
+pub const FRAME_RATES_HZ: std::ops::RangeInclusive<f64> = 1e-3..=1e7;
 
 #[cfg(test)]
 mod tests {

@@ -11,14 +11,14 @@ use std::sync::Arc;
 
 use memmap2::MmapOptions;
 
-use super::Header;
 use super::bytes::Bytes;
+use super::frame_read::Next;
 #[cfg(target_os = "linux")]
 use super::populate::Populate;
 use super::source::FrameSource;
 use super::window::Window;
-use super::y4m::{Layout, Next, Reader};
-use rowtone_failure::Failure;
+use super::y4m::{Layout, Reader};
+use super::{ClipError, Header};
 
 /// Bytes that are mapped at once; more where a frame is larger.
 const WINDOW_BYTES: usize = 4 << 20;
@@ -59,14 +59,14 @@ impl FrameSource for MappedReader {
         self.layout.header()
     }
 
-    fn next_frame(&mut self, bytes: &mut Bytes) -> Result<Next, Failure> {
+    fn next_frame(&mut self, bytes: &mut Bytes) -> Result<Next, ClipError> {
         // Nobody needs the window of the frame before any more.
         *bytes = Bytes::default();
         let mut need = self.layout.stride();
         loop {
             let seen = match self.windows.look(need) {
                 Ok(seen) => seen,
-                Err(error) => return Err(self.layout.unreadable(&error)),
+                Err(error) => return Err(self.layout.unreadable(error)),
             };
             let have = seen.len();
             if have == 0 {
@@ -170,7 +170,7 @@ impl Windows {
 mod tests {
     use super::*;
 
-    type Outcome = Result<(Next, Vec<u8>), Failure>;
+    type Outcome = Result<(Next, Vec<u8>), String>;
 
     /// Everything that a source says, with the planes of each frame.
     fn all(source: &mut dyn FrameSource) -> Vec<Outcome> {
@@ -184,7 +184,8 @@ mod tests {
                 _ => Vec::new(),
             };
             let ended = !matches!(next, Ok(Next::Frame { .. }));
-            outcomes.push(next.map(|next| (next, seen)));
+            let outcome = next.map(|next| (next, seen));
+            outcomes.push(outcome.map_err(|error| error.to_string()));
             if ended {
                 return outcomes;
             }

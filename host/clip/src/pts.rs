@@ -1,25 +1,19 @@
 //! Frame times from a file: timecode format v2, one time in milliseconds a line, as
 //! `rpicam-vid --save-pts` and `mkvextract timestamps_v2` write.
 
+use std::fmt;
+use std::io;
 use std::path::Path;
-
-use rowtone_failure::Failure;
 
 /// Reads the start of exposure of every frame, ns.
 ///
 /// # Errors
-/// [`Failure::Input`], naming the line, for one that is not a number or not later than the one before,
-/// and for a file without any.
-pub fn read(path: &Path) -> Result<Vec<i64>, Failure> {
-    let name = path.display();
-    let bytes =
-        std::fs::read(path).map_err(|e| Failure::input(format!("{name}: cannot be read: {e}")))?;
-    let text = String::from_utf8(bytes).map_err(|_| {
-        Failure::input(format!(
-            "{name}: is no text: --pts wants a file of times, one in milliseconds a line"
-        ))
-    })?;
-    parse(&text).map_err(|what| Failure::input(format!("{name}: {what}")))
+/// [`PtsError`], naming the line, for one that is not a number or not later than the one before, and for
+/// a file without any.
+pub fn read(path: &Path) -> Result<Vec<i64>, PtsError> {
+    let bytes = std::fs::read(path).map_err(PtsError::Read)?;
+    let text = String::from_utf8(bytes).map_err(|_| PtsError::NotText)?;
+    parse(&text)
 }
 
 /// The unit of times that cannot be in milliseconds. They were read as such, ns; the recording is said to
@@ -68,16 +62,14 @@ pub fn wrong_unit(times_ns: &[i64], fps: Option<f64>) -> Option<&'static str> {
 /// ```
 ///
 /// # Errors
-/// What is wrong, in words, with the number of the line.
-pub fn parse(text: &str) -> Result<Vec<i64>, String> {
+/// What is wrong, with the number of the line.
+pub fn parse(text: &str) -> Result<Vec<i64>, PtsError> {
     let mut times: Vec<i64> = Vec::new();
     for (number, line) in (1..).zip(text.lines()) {
         let line = line.trim();
         if line.starts_with('#') {
             if line.contains("format v1") {
-                return Err(format!(
-                    "line {number}: timecode format v1 gives rates, not times: write format v2"
-                ));
+                return Err(PtsError::Rates { line: number });
             }
             continue;
         }
@@ -89,17 +81,21 @@ pub fn parse(text: &str) -> Result<Vec<i64>, String> {
             .ok()
             // 126 years either way, so that the time between any two fits as well.
             .filter(|ms: &f64| ms.abs() < 4e12)
-            .ok_or_else(|| format!("line {number}: {line:?} is not a time in milliseconds"))?;
+            .ok_or_else(|| PtsError::NotATime {
+                line: number,
+                text: line.to_owned(),
+            })?;
         let time = (milliseconds * 1e6).round() as i64;
         if times.last().is_some_and(|&before| time <= before) {
-            return Err(format!(
-                "line {number}: the time {line} ms is not later than the one before it"
-            ));
+            return Err(PtsError::NotLater {
+                line: number,
+                text: line.to_owned(),
+            });
         }
         times.push(time);
     }
     if times.is_empty() {
-        return Err("there is no time in it".to_owned());
+        return Err(PtsError::NoTime);
     }
     Ok(times)
 }
@@ -113,6 +109,127 @@ pub fn period_ns(times: &[i64]) -> Option<i64> {
     let middle = steps.len() / 2;
     Some(*steps.select_nth_unstable(middle).1)
 }
+
+/// Why a file of frame times cannot be used.
+#[derive(Debug)]
+pub enum PtsError {
+    /// It cannot be read.
+    Read(io::Error),
+    /// It is no text.
+    NotText,
+    /// What a line holds is no time; lines are counted from 1.
+    NotATime {
+        /// The line's number.
+        line: usize,
+        /// What it holds.
+        text: String,
+    },
+    /// A time that is not later than the one before it; lines are counted from 1.
+    NotLater {
+        /// The line's number.
+        line: usize,
+        /// The time as it stands there, ms.
+        text: String,
+    },
+    /// It has rates, as timecode format v1 does, in place of times; lines are counted from 1.
+    Rates {
+        /// The line's number.
+        line: usize,
+    },
+    /// There is no time in it.
+    NoTime,
+    /// Its times are in another unit.
+    Unit {
+        /// Which unit they seem to be in.
+        unit: &'static str,
+        /// The time from frame to frame, read as ms.
+        period_ms: f64,
+        /// The recording's frame rate, Hz.
+        fps: Option<f64>,
+    },
+    /// There are fewer times than frames.
+    TooFew {
+        /// How many times there are.
+        have: u64,
+        /// How many frames there are, or how many at the least where more may follow.
+        need: u64,
+        /// More may follow.
+        at_least: bool,
+        /// What the recording is called.
+        recording: String,
+    },
+    /// There are more times than frames.
+    TooMany {
+        /// How many times there are.
+        have: u64,
+        /// How many frames there are.
+        frames: u64,
+        /// What the recording is called.
+        recording: String,
+    },
+}
+
+impl fmt::Display for PtsError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Read(error) => write!(f, "cannot be read: {error}"),
+            Self::NotText => {
+                f.write_str("is no text: --pts wants a file of times, one in milliseconds a line")
+            }
+            Self::NotATime { line, text } => {
+                write!(f, "line {line}: {text:?} is not a time in milliseconds")
+            }
+            Self::NotLater { line, text } => write!(
+                f,
+                "line {line}: the time {text} ms is not later than the one before it"
+            ),
+            Self::Rates { line } => write!(
+                f,
+                "line {line}: timecode format v1 gives rates, not times: write format v2"
+            ),
+            Self::NoTime => f.write_str("there is no time in it"),
+            Self::Unit {
+                unit,
+                period_ms,
+                fps,
+            } => {
+                write!(
+                    f,
+                    "its times look like {unit} ({period_ms} from frame to frame"
+                )?;
+                if let Some(fps) = fps {
+                    let expected_ms = 1e3 / fps;
+                    write!(
+                        f,
+                        ", where a frame at {fps:.3} fps takes {expected_ms:.3} ms"
+                    )?;
+                }
+                f.write_str("): timecode format v2 holds milliseconds")
+            }
+            Self::TooFew {
+                have,
+                need,
+                at_least,
+                recording,
+            } => write!(
+                f,
+                "only {have} times for {}{need} frames of {recording}: every frame needs its own",
+                if *at_least { "at least " } else { "" }
+            ),
+            Self::TooMany {
+                have,
+                frames,
+                recording,
+            } => write!(
+                f,
+                "{have} times for the {frames} frames of {recording}: which frames are missing is \
+                 not known, so no time is sure"
+            ),
+        }
+    }
+}
+
+impl std::error::Error for PtsError {}
 
 #[cfg(test)]
 mod tests {
@@ -130,7 +247,7 @@ mod tests {
             ("# timecode format v1\n0\n", "line 1"),
             ("# timecode format v2\n", "no time"),
         ] {
-            let error = parse(text).unwrap_err();
+            let error = parse(text).unwrap_err().to_string();
             assert!(error.contains(wrong), "{text:?}: {error}");
         }
     }

@@ -5,9 +5,9 @@ use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::Path;
 
-use rowtone_failure::Failure;
-
+use super::ClipError;
 use super::decoded::{self, Decoded};
+use super::error::InputError;
 use super::ffmpeg::{self, Probe};
 use super::header::MAGIC;
 use super::mapped::MappedReader;
@@ -47,24 +47,24 @@ impl Recording {
     /// another kind through ffmpeg. `name` stands in front of every message.
     ///
     /// # Errors
-    /// [`Failure::Input`] for what cannot be opened or is no video.
-    pub(super) fn open(input: &str, name: &str) -> Result<Self, Failure> {
+    /// [`ClipError::Input`] for what cannot be opened or is no video.
+    pub(super) fn open(input: &str, name: &str) -> Result<Self, ClipError> {
         if input == "-" {
             return Self::read(io::stdin(), name);
         }
-        let say = |what: &str| Failure::input(format!("{name}: {what}"));
-        let cannot = |what: &str, error: &io::Error| say(&format!("cannot be {what}: {error}"));
-        let mut file = File::open(input).map_err(|e| cannot("opened", &e))?;
-        let meta = file.metadata().map_err(|e| cannot("read", &e))?;
+        let refuse = |why| ClipError::input(name, why);
+        let unreadable = |error| refuse(InputError::Read(error));
+        let mut file = File::open(input).map_err(|error| refuse(InputError::Open(error)))?;
+        let meta = file.metadata().map_err(unreadable)?;
         if meta.is_dir() {
-            return Err(say("is a folder: give a video file"));
+            return Err(refuse(InputError::Folder));
         }
         if !meta.is_file() {
             return Self::read(file, name);
         }
-        let start = first_bytes(&mut file).map_err(|e| cannot("read", &e))?;
+        let start = first_bytes(&mut file).map_err(unreadable)?;
         if start.is_empty() {
-            return Err(say("the file is empty"));
+            return Err(refuse(InputError::Empty));
         }
         let path = Path::new(input);
         let is_called_y4m = path
@@ -73,7 +73,7 @@ impl Recording {
         if start == MAGIC || is_called_y4m {
             return Self::y4m(file, meta.len(), name);
         }
-        let probe = ffmpeg::probe(path).map_err(|error| decoded::failure(name, &error))?;
+        let probe = ffmpeg::probe(path).map_err(|error| decoded::refused(name, error))?;
         Ok(Self {
             source: Box::new(Decoded::open(path, name, &probe)?),
             about: About {
@@ -87,8 +87,8 @@ impl Recording {
     /// A stream of Y4M.
     ///
     /// # Errors
-    /// [`Failure::Input`] for what is none.
-    pub(super) fn read(from: impl Read + Send + 'static, name: &str) -> Result<Self, Failure> {
+    /// [`ClipError::Input`] for what is none.
+    pub(super) fn read(from: impl Read + Send + 'static, name: &str) -> Result<Self, ClipError> {
         Ok(Self {
             source: Box::new(Reader::open(from, name)?),
             about: About::default(),
@@ -96,7 +96,7 @@ impl Recording {
     }
 
     /// A file of Y4M with this many bytes.
-    fn y4m(file: File, bytes: u64, name: &str) -> Result<Self, Failure> {
+    fn y4m(file: File, bytes: u64, name: &str) -> Result<Self, ClipError> {
         let reader = Reader::open(file, name)?;
         let behind_header = bytes.saturating_sub(reader.header_bytes() as u64);
         let stride = reader.stride() as u64;

@@ -1,11 +1,9 @@
 //! Where frames come from, whatever the way.
 
-use rowtone_failure::Failure;
-
-use super::Header;
 use super::bytes::Bytes;
 use super::ffmpeg::FrameKind;
-use super::y4m::Next;
+use super::frame_read::Next;
+use super::{ClipError, Header};
 
 /// How a frame was coded in its file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,15 +31,15 @@ pub(super) trait FrameSource {
     /// Puts the next frame, whatever stands in front of its luma with it, into `bytes`.
     ///
     /// # Errors
-    /// [`Failure::Input`] when the source cannot be read, or turns out not to be what it said.
-    fn next_frame(&mut self, bytes: &mut Bytes) -> Result<Next, Failure>;
+    /// [`ClipError::Input`] when the source cannot be read, or turns out not to be what it said.
+    fn next_frame(&mut self, bytes: &mut Bytes) -> Result<Next, ClipError>;
 
     /// What the file says of the frame that was delivered last.
     fn stamp(&self) -> Stamp {
         Stamp::default()
     }
 
-    /// Something to tell the user after the last frame.
+    /// Something to tell the user after the last frame, without the name of the recording.
     fn warning(&self) -> Option<String> {
         None
     }

@@ -7,35 +7,17 @@
 
 use std::io::{self, Read};
 
-use super::Header;
 use super::bytes::Bytes;
-use super::header::MAGIC;
+use super::error::InputError;
+pub use super::frame_read::Next;
+use super::header::{HeaderError, MAGIC};
 use super::source::FrameSource;
-use rowtone_failure::Failure;
+use super::{ClipError, Header};
 
 /// The marker in front of a frame, as nearly all writers write it (parameters may follow).
 const MARKER: &[u8] = b"FRAME\n";
 /// No header or frame marker is longer than this.
 const LONGEST_LINE: usize = 4096;
-
-/// What came of asking for a frame.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Next {
-    /// The buffer holds a frame; its luma plane starts at this byte.
-    Frame {
-        /// First byte of the luma plane.
-        luma: usize,
-    },
-    /// The file ended where a frame would begin.
-    End,
-    /// The file ended inside a frame.
-    Truncated {
-        /// Bytes of the frame that were there.
-        have: usize,
-        /// Bytes it should have.
-        need: usize,
-    },
-}
 
 /// How frames follow each other.
 #[derive(Clone, Debug)]
@@ -70,8 +52,8 @@ impl Layout {
     /// Length of the marker at the start of `bytes`; `None` when the bytes end inside it.
     ///
     /// # Errors
-    /// [`Failure::Input`] when there is no marker, which is how a header that lies about its size shows.
-    pub(super) fn check_marker(&self, bytes: &[u8]) -> Result<Option<usize>, Failure> {
+    /// [`ClipError::Input`] when there is no marker, which is how a header that lies about its size shows.
+    pub(super) fn check_marker(&self, bytes: &[u8]) -> Result<Option<usize>, ClipError> {
         if bytes.starts_with(MARKER) {
             return Ok(Some(MARKER.len()));
         }
@@ -88,19 +70,18 @@ impl Layout {
             }
         }
         let Header { width, height, .. } = self.header;
-        Err(Failure::input(format!(
-            "{}: frame {} does not start with FRAME: the file is damaged, or its header is wrong \
-             about the size of {width}x{height}",
-            self.name, self.frames
-        )))
+        let why = InputError::NoMarker {
+            frame: self.frames,
+            width,
+            height,
+        };
+        Err(ClipError::input(&self.name, why))
     }
 
     /// The next frame cannot be read.
-    pub(super) fn unreadable(&self, error: &io::Error) -> Failure {
-        Failure::input(format!(
-            "{}: frame {} cannot be read: {error}",
-            self.name, self.frames
-        ))
+    pub(super) fn unreadable(&self, error: io::Error) -> ClipError {
+        let frame = self.frames;
+        ClipError::input(&self.name, InputError::Frame { frame, error })
     }
 }
 
@@ -116,24 +97,25 @@ impl<R: Read> Reader<R> {
     /// Reads the header. `name` stands in front of every message.
     ///
     /// # Errors
-    /// [`Failure::Input`] for an empty file, one that is no Y4M, and a header that cannot be used.
-    pub fn open(mut from: R, name: &str) -> Result<Self, Failure> {
-        let say = |what: String| Failure::input(format!("{name}: {what}"));
-        let line = read_line(&mut from).map_err(|e| say(format!("cannot be read: {e}")))?;
+    /// [`ClipError::Input`] for an empty file, one that is no Y4M, and a header that cannot be used.
+    pub fn open(mut from: R, name: &str) -> Result<Self, ClipError> {
+        let refuse = |why| ClipError::input(name, why);
+        let unusable = |error| refuse(InputError::Header(error));
+        let line = read_line(&mut from).map_err(|error| refuse(InputError::Read(error)))?;
         if line.is_empty() {
-            return Err(say("the file is empty".to_owned()));
+            return Err(refuse(InputError::Empty));
         }
         let text = line.strip_suffix(b"\n").unwrap_or(&line);
-        let header = Header::parse(text).map_err(say)?;
+        let header = Header::parse(text).map_err(unusable)?;
         if text.len() == line.len() {
-            return Err(say(match line.len() {
-                LONGEST_LINE => format!("its header is longer than {LONGEST_LINE} bytes"),
-                _ => "the file ends inside its header".to_owned(),
+            return Err(unusable(match line.len() {
+                LONGEST_LINE => HeaderError::TooLong(LONGEST_LINE),
+                _ => HeaderError::Ended,
             }));
         }
         let layout = Layout {
             name: name.to_owned(),
-            frame_bytes: header.frame_bytes().map_err(say)?,
+            frame_bytes: header.frame_bytes().map_err(unusable)?,
             header,
             frames: 0,
         };
@@ -167,9 +149,9 @@ impl<R: Read> Reader<R> {
     /// Reads the next frame, marker and all, into `buffer`, which is only grown when it is too short.
     ///
     /// # Errors
-    /// [`Failure::Input`] when the stream cannot be read, or when there is no frame marker where one
+    /// [`ClipError::Input`] when the stream cannot be read, or when there is no frame marker where one
     /// must be, which is how a header that lies about its size shows.
-    pub fn read_frame(&mut self, buffer: &mut Vec<u8>) -> Result<Next, Failure> {
+    pub fn read_frame(&mut self, buffer: &mut Vec<u8>) -> Result<Next, ClipError> {
         let stride = self.stride();
         let have = self.fill(buffer, 0, stride)?;
         if have == 0 {
@@ -198,7 +180,7 @@ impl<R: Read> Reader<R> {
     }
 
     /// Reads up to `count` bytes to `buffer[at..]`; fewer only at the end of the stream.
-    fn fill(&mut self, buffer: &mut Vec<u8>, at: usize, count: usize) -> Result<usize, Failure> {
+    fn fill(&mut self, buffer: &mut Vec<u8>, at: usize, count: usize) -> Result<usize, ClipError> {
         let end = at + count;
         let outcome = if buffer.len() < end && self.layout.frames == 0 {
             // Nothing has shown yet that frames are this large: let the buffer grow with the bytes.
@@ -208,7 +190,7 @@ impl<R: Read> Reader<R> {
             buffer.resize(end.max(buffer.len()), 0);
             read_full(&mut self.from, &mut buffer[at..end])
         };
-        outcome.map_err(|error| self.layout.unreadable(&error))
+        outcome.map_err(|error| self.layout.unreadable(error))
     }
 }
 
@@ -217,7 +199,7 @@ impl<R: Read> FrameSource for Reader<R> {
         self.layout.header()
     }
 
-    fn next_frame(&mut self, bytes: &mut Bytes) -> Result<Next, Failure> {
+    fn next_frame(&mut self, bytes: &mut Bytes) -> Result<Next, ClipError> {
         self.read_frame(bytes.buffer())
     }
 }
@@ -255,7 +237,7 @@ mod tests {
     use super::super::PixelFormat;
     use super::*;
 
-    fn open(bytes: &[u8]) -> Result<Reader<&[u8]>, Failure> {
+    fn open(bytes: &[u8]) -> Result<Reader<&[u8]>, ClipError> {
         Reader::open(bytes, "clip")
     }
 

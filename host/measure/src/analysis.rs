@@ -10,11 +10,11 @@ use rowtone::spectrum::Config;
 use rowtone::timeline::{Group, Sample, Tally, rows_per_sample};
 use rowtone::tracker::Axes;
 
+use crate::MeasureError;
 use crate::memory::SpectrumMemory;
 use crate::tracking::{FrameShifts, Shifts};
 use crate::wander::Wander;
 use rowtone_clip::{Camera, Rect};
-use rowtone_failure::Failure;
 
 /// Highest frequency that is looked for when none is given, Hz: beyond what machines do as a rule, and
 /// few enough samples.
@@ -71,20 +71,18 @@ impl Plan {
     /// Chooses how many rows make a sample: as many as the highest frequency allows.
     ///
     /// # Errors
-    /// [`Failure::Usage`] for settings that cannot be used.
-    pub fn new(camera: &Camera, settings: &Settings) -> Result<Self, Failure> {
-        let refuse = |error: &dyn std::fmt::Display| Failure::usage(error.to_string());
+    /// [`MeasureError::Settings`] for settings that cannot be used.
+    pub fn new(camera: &Camera, settings: &Settings) -> Result<Self, MeasureError> {
         // Rows are counted from the top of the part.
         let timing = Timing::new(
             camera.timing.line_time_ps(),
             camera.timing.exposure_ns(),
             camera.part_or_rest()?.height as u16,
-        )
-        .map_err(|error| refuse(&error))?;
+        )?;
         let frames = (settings.window_s * camera.fps).ceil() as u32;
         let max_hz = settings.max_hz.unwrap_or(USUAL_MAX_HZ);
         let rows = rows_per_sample(timing, (DENSER * max_hz) as f32, frames, MOST_SAMPLES);
-        let group = Group::new(timing, rows).map_err(|error| refuse(&error))?;
+        let group = Group::new(timing, rows)?;
         let config = Config {
             window_ns: (settings.window_s * 1e9).round() as i64,
             hop_ns: (settings.hop_s * 1e9).round() as i64,
@@ -97,7 +95,7 @@ impl Plan {
             um_per_px: settings.um_per_px.map(|scale| scale as f32),
             ..Config::default()
         };
-        config.check().map_err(|error| refuse(&error))?;
+        config.check()?;
         Ok(Self {
             config,
             group,
@@ -137,6 +135,8 @@ impl Plan {
 pub enum Event<'a> {
     /// This part of the picture as it was given is measured; before the first frame.
     Part(Rect),
+    /// Something to tell the user, a line, without the recording's name.
+    Note(&'a str),
     /// A frame has been taken in; it started at this time, ns.
     Frame(i64),
     /// Some rows of it, combined.
@@ -162,14 +162,13 @@ impl<'a> Analysis<'a> {
     /// An analysis of what `shifts` delivers, which must combine rows in the plan's groups.
     ///
     /// # Errors
-    /// [`Failure::Usage`] for settings that cannot be used.
+    /// [`MeasureError::Settings`] for settings that cannot be used.
     pub fn new(
         shifts: Shifts,
         plan: &Plan,
         memory: &'a mut SpectrumMemory,
-    ) -> Result<Self, Failure> {
-        let reports = ReportSide::new(plan.config, plan.group, memory.lend())
-            .map_err(|error| Failure::usage(error.to_string()))?;
+    ) -> Result<Self, MeasureError> {
+        let reports = ReportSide::new(plan.config, plan.group, memory.lend())?;
         Ok(Self {
             shifts,
             reports,
@@ -183,11 +182,11 @@ impl<'a> Analysis<'a> {
     /// comes before the failure.
     ///
     /// # Errors
-    /// [`Failure`] of the input, or what `on` returned.
-    pub fn run(
+    /// [`MeasureError`] of the input, or what `on` returned.
+    pub fn run<E: From<MeasureError>>(
         &mut self,
-        mut on: impl FnMut(Event<'_>) -> Result<(), Failure>,
-    ) -> Result<(), Failure> {
+        mut on: impl FnMut(Event<'_>) -> Result<(), E>,
+    ) -> Result<(), E> {
         let outcome = loop {
             match self.shifts.next_frame() {
                 Ok(Some(frame)) => {
@@ -195,7 +194,7 @@ impl<'a> Analysis<'a> {
                     self.shifts.recycle(frame);
                 }
                 Ok(None) => break Ok(()),
-                Err(failure) => break Err(failure),
+                Err(error) => break Err(error.into()),
             }
         };
         if let Some(report) = self.reports.finish() {
@@ -205,7 +204,7 @@ impl<'a> Analysis<'a> {
     }
 
     /// What to say when no row of the recording could be measured.
-    pub fn nothing_measured(&self) -> Failure {
+    pub fn nothing_measured(&self) -> MeasureError {
         self.shifts.nothing_measured()
     }
 
@@ -214,14 +213,17 @@ impl<'a> Analysis<'a> {
         self.shifts.warning()
     }
 
-    fn take(
+    fn take<E>(
         &mut self,
         frame: &FrameShifts,
-        on: &mut impl FnMut(Event<'_>) -> Result<(), Failure>,
-    ) -> Result<(), Failure> {
+        on: &mut impl FnMut(Event<'_>) -> Result<(), E>,
+    ) -> Result<(), E> {
         if let Some(chosen) = frame.chosen {
             self.camera_moves = chosen.camera_moves;
             on(Event::Part(chosen.part))?;
+        }
+        for note in &frame.notes {
+            on(Event::Note(note))?;
         }
         on(Event::Frame(frame.start_ns))?;
         let mut tally = Tally::NONE;
@@ -242,11 +244,11 @@ impl<'a> Analysis<'a> {
         readings.try_for_each(|reading| self.push(reading, on))
     }
 
-    fn push(
+    fn push<E>(
         &mut self,
         reading: &Reading,
-        on: &mut impl FnMut(Event<'_>) -> Result<(), Failure>,
-    ) -> Result<(), Failure> {
+        on: &mut impl FnMut(Event<'_>) -> Result<(), E>,
+    ) -> Result<(), E> {
         if let Some(sample) = &reading.sample {
             on(Event::Sample(sample))?;
         }
@@ -258,11 +260,11 @@ impl<'a> Analysis<'a> {
         Ok(())
     }
 
-    fn hand_on(
+    fn hand_on<E>(
         &mut self,
         mut report: Report,
-        on: &mut impl FnMut(Event<'_>) -> Result<(), Failure>,
-    ) -> Result<(), Failure> {
+        on: &mut impl FnMut(Event<'_>) -> Result<(), E>,
+    ) -> Result<(), E> {
         self.silence.number(&mut report);
         // What the recording as a whole warns of.
         report.warnings = report.warnings.union(self.shifts.camera.warnings);

@@ -5,7 +5,10 @@
 //! - [`restore`]: gaps filled, for the ear.
 
 pub mod analysis;
+mod error;
 pub mod memory;
 pub mod restore;
 pub mod tracking;
 mod wander;
+
+pub use error::{MeasureError, PartError, SettingsError};

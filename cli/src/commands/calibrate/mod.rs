@@ -6,11 +6,11 @@ mod report;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
+use crate::failure::Failure;
 use pictures::{each_picture, full_scale};
 use rowtone_calibrate::rows::{Collector, Recording};
 use rowtone_calibrate::{Light, calibrate_with_stripes, plot, vibration};
 use rowtone_clip::Rect;
-use rowtone_failure::Failure;
 use rowtone_files::WholeFile;
 
 /// Standard deviation of the mains frequency, relative: ±0.03 Hz of 50, what large grids keep.

@@ -3,10 +3,10 @@
 use std::path::Path;
 
 use super::Args;
+use crate::failure::Failure;
 use rowtone::camera::Pixels;
 use rowtone_clip::picture::{self, Grey};
-use rowtone_clip::{CameraArgs, Feed, Rect};
-use rowtone_failure::Failure;
+use rowtone_clip::{CameraOptions, Feed, Rect};
 
 /// The value of white: 255, or all ones of the depth that the values need.
 pub(super) fn full_scale(picture: &[u16]) -> u16 {
@@ -99,12 +99,12 @@ fn each_frame(
     name: &str,
     mut sink: impl FnMut(&[u16], usize),
 ) -> Result<Info, Failure> {
-    let options = CameraArgs {
+    let options = CameraOptions {
         fps: args.fps,
         pts: args.pts.clone(),
         // The line time is what is looked for.
         global_shutter: true,
-        ..CameraArgs::of(name)
+        ..CameraOptions::of(name)
     };
     let mut feed = Feed::open(&options)?;
     feed.stop_when(crate::stop::on_signals());

@@ -12,7 +12,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use rowtone::report::{MAX_PEAKS, Report};
 
-use rowtone_failure::Failure;
+use crate::failure::Failure;
 use rowtone_report::{band_velocity, json};
 
 /// The format, by the file's ending.

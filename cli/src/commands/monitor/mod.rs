@@ -13,8 +13,7 @@ use std::path::PathBuf;
 
 use clap::ValueEnum;
 
-use crate::failures;
-use rowtone_failure::Failure;
+use crate::failure::Failure;
 use rowtone_serial::line;
 use rowtone_serial::port::PortName;
 
@@ -58,7 +57,7 @@ enum Format {
 /// given, or when the log cannot be written.
 pub fn run(args: &Args) -> Result<(), Failure> {
     let log = args.log.as_deref().map(log::Log::open).transpose()?;
-    let (events, commands) = line::listen(&args.port).map_err(failures::serial)?;
+    let (events, commands) = line::listen(&args.port)?;
     let on_terminal = std::io::stdout().is_terminal() && args.port.path != "-";
     match args.format {
         None if on_terminal => screen::run(&args.port.path, args.once, &events, &commands, log),

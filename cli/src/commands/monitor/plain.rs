@@ -7,8 +7,8 @@ use rowtone::wire::Arrival;
 
 use super::log::Log;
 use super::{Format, went_away};
+use crate::failure::Failure;
 use crate::output::Out;
-use rowtone_failure::Failure;
 use rowtone_report::{json, text};
 use rowtone_serial::line::Event;
 use rowtone_serial::receiver::{Heard, Receiver as Board};

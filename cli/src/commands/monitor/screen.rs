@@ -10,8 +10,8 @@ use super::history::History;
 use super::log::Log;
 use super::signals::Signals;
 use super::view::View;
+use crate::failure::Failure;
 use crate::terminal::Terminal;
-use rowtone_failure::Failure;
 use rowtone_serial::line::Event;
 use rowtone_serial::receiver::Receiver as Board;
 

@@ -8,7 +8,7 @@ use rowtone::wire::Arrival;
 use super::history::History;
 use super::log::Log;
 use super::went_away;
-use rowtone_failure::Failure;
+use crate::failure::Failure;
 use rowtone_serial::line::Event;
 use rowtone_serial::receiver::{Heard, Receiver as Board};
 

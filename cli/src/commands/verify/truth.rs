@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
+use crate::failure::Failure;
 use rowtone_clip::{Rect, Roi};
-use rowtone_failure::Failure;
 use serde::Deserialize;
 
 /// A recording and what is true of it.

@@ -5,10 +5,10 @@ use std::fmt::Write;
 use super::film::{Film, Setup};
 use super::sound::{Sound, compared, hear, truth};
 use super::{Folder, Scale};
+use crate::LabError;
 use crate::figure::shades::Panels;
 use crate::sound::stft::spectrogram;
 use host_sim::{Chirp, Motion};
-use rowtone_failure::Failure;
 
 /// A window of the spectrogram, s.
 const WINDOW_S: f64 = 0.05;
@@ -46,8 +46,8 @@ fn followed(sound: &Sound, ramp: &Chirp) -> (f64, f64) {
 /// A table, a figure of spectrograms, and sounds.
 ///
 /// # Errors
-/// [`Failure`] for what cannot be simulated or written.
-pub fn run(folder: &Folder, scale: Scale) -> Result<(), Failure> {
+/// [`LabError`] for what cannot be simulated or written.
+pub fn run(folder: &Folder, scale: Scale) -> Result<(), LabError> {
     let setup = Setup::thesis(scale.sound_cols, scale.sound_frames, scale.seed).sharp(scale.sharp);
     let ramp = ramp(f64::from(scale.sound_frames) / setup.sensor.fps);
     let motion = Motion {

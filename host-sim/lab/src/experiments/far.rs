@@ -7,12 +7,12 @@ use std::fmt::Write;
 
 use super::Folder;
 use super::film::Setup;
+use crate::LabError;
 use crate::figure::lines::{Curve, Lines};
 use crate::methods::thesis::{Reference, Thesis};
 use crate::methods::visual::{By, VisualMicrophone};
 use crate::methods::{Clip, Method, Shifts};
 use host_sim::{Motion, Step};
-use rowtone_failure::Failure;
 use rowtone_linear::median;
 
 /// Places of the object, px.
@@ -46,8 +46,8 @@ fn read(all: &[Shifts]) -> Vec<(f64, f64)> {
 /// A table and a figure.
 ///
 /// # Errors
-/// [`Failure`] for what cannot be simulated or written.
-pub fn run(folder: &Folder) -> Result<(), Failure> {
+/// [`LabError`] for what cannot be simulated or written.
+pub fn run(folder: &Folder) -> Result<(), LabError> {
     let mut setup = Setup::thesis(256, PLACES.len() as u32, 1);
     setup.sensor.rows = 96;
     let frame_s = 1.0 / setup.sensor.fps;

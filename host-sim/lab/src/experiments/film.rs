@@ -3,13 +3,13 @@
 use rowtone::camera::Timing;
 
 use super::working_on;
+use crate::LabError;
 use crate::methods::core::Core;
 use crate::methods::study::{Recording, record};
 use crate::methods::thesis::Thesis;
 use crate::methods::visual::{By, VisualMicrophone};
 use crate::methods::{Method, Shifts};
 use host_sim::{Config, Motion, Optics, Preset, Scene, Sensor};
-use rowtone_failure::Failure;
 
 /// A camera and what it looks at.
 #[derive(Clone, Debug)]
@@ -54,8 +54,8 @@ impl Setup {
     /// Films a motion.
     ///
     /// # Errors
-    /// [`Failure::Usage`] for what cannot be simulated.
-    pub fn film(&self, motion: &Motion) -> Result<Film, Failure> {
+    /// [`LabError`] for what cannot be simulated.
+    pub fn film(&self, motion: &Motion) -> Result<Film, LabError> {
         let mut config = Config {
             seed: self.seed,
             sensor: self.sensor.clone(),
@@ -66,10 +66,9 @@ impl Setup {
         };
         config.optics.blur_px = Optics::blur_for_cutoff(self.cutoff_cycles_per_px);
         let sensor = &self.sensor;
-        let timing = Timing::new(sensor.line_time_ps, sensor.exposure_ns, sensor.rows as u16)
-            .map_err(|e| Failure::usage(e.to_string()))?;
+        let timing = Timing::new(sensor.line_time_ps, sensor.exposure_ns, sensor.rows as u16)?;
         Ok(Film {
-            recording: record(config).map_err(super::refused)?,
+            recording: record(config)?,
             core: Core {
                 timing,
                 frame_ns: (1e9 / sensor.fps).round() as i64,

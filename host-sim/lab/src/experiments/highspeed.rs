@@ -8,6 +8,7 @@ use rowtone::camera::Timing;
 
 use super::film::Setup;
 use super::{Folder, working_on};
+use crate::LabError;
 use crate::methods::classical::Classical;
 use crate::methods::core::Core;
 use crate::methods::study::{Fit, Recording};
@@ -17,7 +18,6 @@ use crate::methods::{Clip, Method, Shifts, remove_row_means};
 use host_sim::{Motion, Tone};
 use rowtone_clip::Turn;
 use rowtone_clip::y4m::{Next, Reader};
-use rowtone_failure::Failure;
 use rowtone_linear::dot;
 
 /// The simulated tones: frequency, Hz, and amplitude, px.
@@ -87,8 +87,8 @@ fn tones(
 /// A table of a simulated recording, and of a real one where `real` names one.
 ///
 /// # Errors
-/// [`Failure`] for what cannot be simulated, read or written.
-pub fn run(folder: &Folder, real: Option<&Path>) -> Result<(), Failure> {
+/// [`LabError`] for what cannot be simulated, read or written.
+pub fn run(folder: &Folder, real: Option<&Path>) -> Result<(), LabError> {
     let mut text = simulated()?;
     if let Some(path) = real {
         text += &measured(path)?;
@@ -96,7 +96,7 @@ pub fn run(folder: &Folder, real: Option<&Path>) -> Result<(), Failure> {
     folder.table("highspeed.md", &text)
 }
 
-fn simulated() -> Result<String, Failure> {
+fn simulated() -> Result<String, LabError> {
     let mut setup = Setup::thesis(96, 500, 1);
     let sensor = &mut setup.sensor;
     (sensor.rows, sensor.fps, sensor.line_time_ps) = (64, 2500.0, 0);
@@ -129,10 +129,9 @@ fn simulated() -> Result<String, Failure> {
     Ok(text)
 }
 
-fn measured(path: &Path) -> Result<String, Failure> {
+fn measured(path: &Path) -> Result<String, LabError> {
     let recording = beam(path)?;
-    let timing = Timing::new(0, 0, recording.clip.height as u16)
-        .map_err(|e| Failure::usage(e.to_string()))?;
+    let timing = Timing::new(0, 0, recording.clip.height as u16)?;
     let core = Core {
         timing,
         frame_ns: (1e9 / recording.fps).round() as i64,
@@ -159,17 +158,17 @@ fn measured(path: &Path) -> Result<String, Failure> {
 
 /// Reads a Y4M of one byte a pixel, turned so that what moved up and down moves across. Nothing is known of its noise, so
 /// a row's weight is its contrast.
-fn beam(path: &Path) -> Result<Recording, Failure> {
+fn beam(path: &Path) -> Result<Recording, LabError> {
     let name = path.display().to_string();
-    let file =
-        File::open(path).map_err(|e| Failure::input(format!("{name}: cannot be opened: {e}")))?;
+    let file = File::open(path).map_err(|why| LabError::Open {
+        path: path.to_owned(),
+        why,
+    })?;
     let mut reader = Reader::open(file, &name)?;
     let header = reader.header().clone();
     let (width, height) = (header.width, header.height);
     let (8, Some(fps)) = (header.format.bits, header.fps) else {
-        return Err(Failure::input(format!(
-            "{name}: want 8 bits and a frame rate in the header"
-        )));
+        return Err(LabError::Depth(path.to_owned()));
     };
     let mut frames: Vec<Vec<f64>> = Vec::new();
     let mut bytes = Vec::new();

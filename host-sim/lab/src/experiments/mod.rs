@@ -15,8 +15,7 @@
 
 use std::path::{Path, PathBuf};
 
-use host_sim::SimError;
-use rowtone_failure::Failure;
+use crate::LabError;
 use rowtone_plot::Drawing;
 
 pub mod chirp;
@@ -81,10 +80,9 @@ impl Folder {
     /// Made where it does not exist.
     ///
     /// # Errors
-    /// [`Failure::Input`] where it cannot be made.
-    pub fn new(path: &Path) -> Result<Self, Failure> {
-        std::fs::create_dir_all(path)
-            .map_err(|e| Failure::writing(&path.display().to_string(), &e))?;
+    /// [`LabError`] where it cannot be made.
+    pub fn new(path: &Path) -> Result<Self, LabError> {
+        std::fs::create_dir_all(path).map_err(|why| cannot_write(path, why))?;
         Ok(Self(path.to_owned()))
     }
 
@@ -96,11 +94,10 @@ impl Folder {
     /// Writes a table, and prints it.
     ///
     /// # Errors
-    /// [`Failure::Input`] where it cannot be written.
-    pub fn table(&self, name: &str, text: &str) -> Result<(), Failure> {
+    /// [`LabError`] where it cannot be written.
+    pub fn table(&self, name: &str, text: &str) -> Result<(), LabError> {
         let path = self.file(name);
-        std::fs::write(&path, text)
-            .map_err(|e| Failure::writing(&path.display().to_string(), &e))?;
+        std::fs::write(&path, text).map_err(|why| cannot_write(&path, why))?;
         println!("{text}");
         Ok(())
     }
@@ -108,16 +105,16 @@ impl Folder {
     /// Writes a drawing: SVG or PNG, as the name ends.
     ///
     /// # Errors
-    /// [`Failure::Input`] where it cannot be drawn or written.
-    pub fn drawing(&self, name: &str, drawing: &impl Drawing) -> Result<(), Failure> {
-        rowtone_plot::write(&self.file(name), drawing).map_err(|e| Failure::input(e.to_string()))
+    /// [`LabError`] where it cannot be drawn or written.
+    pub fn drawing(&self, name: &str, drawing: &impl Drawing) -> Result<(), LabError> {
+        Ok(rowtone_plot::write(&self.file(name), drawing)?)
     }
 
     /// Writes a sound, its peak at nine tenths of full scale, 16 bits.
     ///
     /// # Errors
-    /// [`Failure::Input`] where it cannot be written.
-    pub fn wav(&self, name: &str, samples: &[f64], rate_hz: f64) -> Result<(), Failure> {
+    /// [`LabError`] where it cannot be written.
+    pub fn wav(&self, name: &str, samples: &[f64], rate_hz: f64) -> Result<(), LabError> {
         let spec = hound::WavSpec {
             channels: 1,
             sample_rate: rate_hz.round() as u32,
@@ -133,7 +130,10 @@ impl Folder {
             }
             writer.finalize()
         };
-        write().map_err(|e| Failure::input(format!("{}: cannot be written: {e}", path.display())))
+        write().map_err(|why| LabError::Sound {
+            path: path.clone(),
+            why,
+        })
     }
 }
 
@@ -142,7 +142,9 @@ fn working_on(what: &str) {
     eprintln!("rowtone: {what}");
 }
 
-/// A simulation that was refused.
-fn refused(error: SimError) -> Failure {
-    Failure::usage(error.to_string())
+fn cannot_write(path: &Path, why: std::io::Error) -> LabError {
+    LabError::Write {
+        path: path.to_owned(),
+        why,
+    }
 }

@@ -5,10 +5,10 @@ use std::fmt::Write;
 use super::film::Setup;
 use super::voices::{HEAD, heard};
 use super::{Folder, Scale, working_on};
+use crate::LabError;
 use crate::methods::study::score;
 use crate::sound::sounds;
 use host_sim::{Motion, Tone};
-use rowtone_failure::Failure;
 
 /// The phone's camera.
 fn setup(cols: u32, frames: u32, seed: u64) -> Setup {
@@ -23,8 +23,8 @@ fn setup(cols: u32, frames: u32, seed: u64) -> Setup {
 /// Tables and sounds.
 ///
 /// # Errors
-/// [`Failure`] for what cannot be simulated or written.
-pub fn run(folder: &Folder, scale: Scale) -> Result<(), Failure> {
+/// [`LabError`] for what cannot be simulated or written.
+pub fn run(folder: &Folder, scale: Scale) -> Result<(), LabError> {
     let mut text = format!(
         "30 fps, {}x720, 27.8 µs a row (40 % blank), exposed for 0.25 ms. Tones of 0.3 px, 30 frames, seed {}\n\n\
          | Hz | method | noise / bound | amplitude | frequency error, Hz | largest ghost at ±30, 60, 90 Hz |\n\

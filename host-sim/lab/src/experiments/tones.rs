@@ -4,11 +4,11 @@ use std::fmt::Write;
 
 use super::film::Setup;
 use super::{Folder, Scale};
+use crate::LabError;
 use crate::figure::lines::{Curve, Lines};
 use crate::methods::remove_row_means;
 use crate::methods::study::Fit;
 use host_sim::{Motion, Tone};
-use rowtone_failure::Failure;
 
 /// Where the strongest tone is looked for, Hz.
 const BAND_HZ: (f64, f64) = (40.0, 400.0);
@@ -27,12 +27,12 @@ pub struct Found {
 /// Films and measures one tone: by each method in turn, with its name.
 ///
 /// # Errors
-/// [`Failure::Usage`] for what cannot be simulated.
+/// [`LabError`] for what cannot be simulated.
 pub fn measure(
     hz: f64,
     amplitude_px: f64,
     setup: &Setup,
-) -> Result<Vec<(&'static str, Option<Found>)>, Failure> {
+) -> Result<Vec<(&'static str, Option<Found>)>, LabError> {
     let tone = Tone {
         hz,
         amplitude_px,
@@ -64,8 +64,8 @@ pub fn measure(
 /// The whole sweep: a table and a figure.
 ///
 /// # Errors
-/// [`Failure`] for what cannot be simulated or written.
-pub fn run(folder: &Folder, scale: Scale, amplitude_px: f64) -> Result<(), Failure> {
+/// [`LabError`] for what cannot be simulated or written.
+pub fn run(folder: &Folder, scale: Scale, amplitude_px: f64) -> Result<(), LabError> {
     let cols = scale.tone_cols;
     let setup = Setup::thesis(cols, 6, 1).sharp(scale.sharp);
     let mut text = format!(

@@ -6,11 +6,11 @@ use super::chirp::{all, file_name};
 use super::film::Setup;
 use super::sound::{compared, truth};
 use super::{Folder, Scale};
+use crate::LabError;
 use crate::figure::shades::Panels;
 use crate::sound::sounds::{self, RATE_HZ};
 use crate::sound::stft::spectrogram;
 use host_sim::{Motion, Sound};
-use rowtone_failure::Failure;
 
 /// A sound as a motion of at most 0.5 px.
 pub(super) fn motion(samples: &[f64]) -> Motion {
@@ -31,7 +31,7 @@ pub(super) fn heard(
     sound: &sounds::Sound,
     prefix: &str,
     text: &mut String,
-) -> Result<Panels, Failure> {
+) -> Result<Panels, LabError> {
     let seconds = f64::from(setup.frames) / setup.sensor.fps;
     let count = ((seconds * RATE_HZ) as usize).min(sound.samples.len());
     let film = setup.film(&motion(&sound.samples[..count]))?;
@@ -79,8 +79,8 @@ pub(super) const HEAD: &str = "SNR = 10·log10(Σ I² / Σ (Î − I)²) and mea
 /// A table, figures and sounds.
 ///
 /// # Errors
-/// [`Failure`] for what cannot be simulated or written.
-pub fn run(folder: &Folder, scale: Scale) -> Result<(), Failure> {
+/// [`LabError`] for what cannot be simulated or written.
+pub fn run(folder: &Folder, scale: Scale) -> Result<(), LabError> {
     let setup = Setup::thesis(scale.sound_cols, scale.sound_frames, scale.seed).sharp(scale.sharp);
     let mut text = format!(
         "0.5 px at the loudest, {}x1048 at 120 fps, {} frames, seed {}{}. {HEAD}",

@@ -12,9 +12,9 @@ use rowtone::timeline::{Sample, Spread};
 use super::bound::Bound;
 use super::scene::{Draw, TrueTone, Truth};
 use super::score::Score;
+use crate::LabError;
 use host_sim::{Camera, Optics, Preset, SimError, crlb, y4m};
-use rowtone_clip::{CameraArgs, Feed, Times};
-use rowtone_failure::Failure;
+use rowtone_clip::{CameraOptions, Feed, Times};
 use rowtone_measure::analysis::{Analysis, Event, Plan, Settings};
 use rowtone_measure::tracking::Shifts;
 
@@ -106,23 +106,25 @@ impl Recording {
     /// What the whole way makes of it: one window, the whole recording.
     ///
     /// # Errors
-    /// [`Failure`] as `rowtone analyze`.
-    pub fn analyze(&self) -> Result<Report, Failure> {
+    /// [`LabError`] as `rowtone analyze`.
+    pub fn analyze(&self) -> Result<Report, LabError> {
         let mut clip = Vec::new();
-        let to_memory = |e| Failure::writing("memory", &e);
+        let to_memory = |why| LabError::Write {
+            path: "memory".into(),
+            why,
+        };
         y4m::write_header(&mut clip, &self.camera.config().sensor).map_err(to_memory)?;
         for frame in self.camera.frames() {
             y4m::write_frame(&mut clip, &frame).map_err(to_memory)?;
         }
         let sensor = &self.camera.config().sensor;
-        let args = CameraArgs {
+        let args = CameraOptions {
             line_time_us: Some(f64::from(sensor.line_time_ps) * 1e-6),
             exposure_us: Some(f64::from(sensor.exposure_ns) * 1e-3),
-            ..CameraArgs::of("the simulated recording")
+            ..CameraOptions::of("the simulated recording")
         };
         let starts = self.camera.arriving().map(|slot| slot.start_ns).collect();
-        let times = Times::new(starts, Some(sensor.fps))
-            .ok_or_else(|| Failure::input("the simulated recording: no frame arrives"))?;
+        let times = Times::new(starts, Some(sensor.fps)).ok_or(LabError::NoFrame)?;
         let feed = Feed::at_times(&args, Cursor::new(clip), times)?;
         let plan = Plan::new(
             &feed.camera,
@@ -132,29 +134,31 @@ impl Recording {
                 ..Settings::default()
             },
         )?;
-        let mut shifts = Shifts::start(feed, Some(plan.groups()))?;
-        shifts.quiet = true;
+        let shifts = Shifts::start(feed, Some(plan.groups()))?;
         let mut memory = plan.memory();
         let mut last = None;
         Analysis::new(shifts, &plan, &mut memory)?.run(|event| {
             if let Event::Report(report, _) = event {
                 last = Some(report.clone());
             }
-            Ok(())
+            Ok::<(), LabError>(())
         })?;
-        last.ok_or_else(|| Failure::input("the simulated recording: no report came"))
+        last.ok_or(LabError::NoReport)
     }
 }
 
 /// Draws and scores `count` recordings.
 ///
 /// # Errors
-/// [`Failure`] of the first recording that cannot be made or analysed.
-pub fn score(ranges: &Ranges, seed: u64, count: u64) -> Result<Score, Failure> {
+/// [`LabError`] of the first recording that cannot be made or analysed.
+pub fn score(ranges: &Ranges, seed: u64, count: u64) -> Result<Score, LabError> {
     let mut score = Score::default();
     for number in 0..count {
-        let recording = Recording::draw(ranges, seed, number)
-            .map_err(|e| Failure::input(format!("recording {number}: {e}")))?;
+        let recording =
+            Recording::draw(ranges, seed, number).map_err(|why| LabError::Recording {
+                what: format!("recording {number}"),
+                why,
+            })?;
         score.add(number, &recording.truth, &recording.analyze()?);
     }
     Ok(score)

@@ -5,8 +5,8 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use super::bound::Bound;
 use super::cameras::{Recording, rows};
 use super::scene::{TrueTone, Truth};
-use host_sim::{Camera, Config, Preset, SimError, Tone};
-use rowtone_failure::Failure;
+use crate::LabError;
+use host_sim::{Camera, Config, Preset, Tone};
 
 /// Tones, Hz.
 const HZ: [f64; 11] = [
@@ -41,14 +41,14 @@ impl Row {
 /// The thesis's camera, `cols` columns of it, for `frames` frames; `tries` recordings a tone.
 ///
 /// # Errors
-/// [`Failure`] of the first recording that cannot be made or analysed.
+/// [`LabError`] of the first recording that cannot be made or analysed.
 pub fn rows_of(
     frames: u32,
     amplitude_px: f64,
     cols: u32,
     seed: u64,
     tries: u64,
-) -> Result<Vec<Row>, Failure> {
+) -> Result<Vec<Row>, LabError> {
     let row = |hz| row(hz, frames, amplitude_px, cols, seed, tries);
     HZ.into_iter().map(row).collect()
 }
@@ -60,8 +60,11 @@ fn row(
     cols: u32,
     seed: u64,
     tries: u64,
-) -> Result<Row, Failure> {
-    let cannot = |e: SimError| Failure::input(format!("{frames} frames at {hz} Hz: {e}"));
+) -> Result<Row, LabError> {
+    let cannot = |why| LabError::Recording {
+        what: format!("{frames} frames at {hz} Hz"),
+        why,
+    };
     let mut row = Row {
         hz,
         kept: 1.0,

@@ -5,11 +5,11 @@ use std::ops::Range;
 use rowtone::camera::Timing;
 use rowtone::pipeline::{LineSide, Reading};
 use rowtone::timeline::{Displacement, Group};
-use rowtone::tracker::{Axes, Config, ConfigError, Outcome};
+use rowtone::tracker::{Axes, Config, Outcome};
 
+use crate::PartError;
 use crate::memory::TrackerMemory;
 use rowtone_clip::{Frame, Rect};
-use rowtone_failure::Failure;
 
 /// A line side on one part of the picture.
 #[derive(Debug)]
@@ -45,7 +45,7 @@ impl<'a> Engine<'a> {
     /// A line side on `part` of a picture with this timing and this many `bits` a pixel; `memory` is for the axes wanted.
     ///
     /// # Errors
-    /// [`Failure::Input`] when the part cannot be measured; `name` stands in front.
+    /// [`PartError`] when the part cannot be measured.
     pub fn new(
         part: Rect,
         timing: Timing,
@@ -53,9 +53,7 @@ impl<'a> Engine<'a> {
         bits: u8,
         learn_frames: u16,
         memory: &'a mut TrackerMemory,
-        name: &str,
-    ) -> Result<Self, Failure> {
-        let refuse = |error: ConfigError| Failure::input(format!("{name}: {error}"));
+    ) -> Result<Self, PartError> {
         // Sizes beyond u16 were refused with the header.
         let width = u16::try_from(part.width).unwrap_or(u16::MAX);
         let config = Config {
@@ -65,9 +63,9 @@ impl<'a> Engine<'a> {
             learn_frames,
             ..Config::new(timing, width)
         };
-        let one_row = || Group::new(timing, 1).map_err(|e| Failure::input(format!("{name}: {e}")));
+        let one_row = || Group::new(timing, 1);
         let group = wanted.group.map_or_else(one_row, Ok)?;
-        let lines = LineSide::new(config, group, memory.lend()).map_err(refuse)?;
+        let lines = LineSide::new(config, group, memory.lend())?;
         Ok(Self {
             part,
             rows: 0..part.height,

@@ -9,10 +9,10 @@ use rowtone::timeline::{Displacement, Group};
 use super::codec;
 use super::region::{self, Choice, Region};
 use super::{Chosen, Ending, Engine, FrameShifts, Wanted, background};
+use crate::MeasureError;
 use crate::memory::TrackerMemory;
 use rowtone_clip::ring::Outlet;
-use rowtone_clip::{Camera, Feed, Frame, Rect};
-use rowtone_failure::Failure;
+use rowtone_clip::{Camera, ClipError, Feed, Frame, Rect};
 
 /// Frames that the reference is learned from.
 const LEARN_FRAMES: usize = 30;
@@ -45,10 +45,8 @@ fn measure_all(
     let (kept, more) = keep_first(feed);
     if kept.len() < 2 {
         more?;
-        return Err(Failure::input(format!(
-            "{}: only one frame: motion shows only from frame to frame",
-            feed.name
-        )));
+        let name = feed.name.clone();
+        return Err(MeasureError::OneFrame { name });
     }
     let whole = Region::whole(&part);
     let mut lines = Lines::new(
@@ -82,7 +80,7 @@ fn measure_all(
     }
     lines.learn(&kept, 1);
     if let Some(cut) = kept.iter().find(|frame| frame.is_cut()) {
-        return Err(feed.cut_short(cut));
+        return Err(feed.cut_short(cut).into());
     }
     // What a codec or a denoiser took shows in the part that is measured.
     let seen = Rect {
@@ -94,8 +92,7 @@ fn measure_all(
     lines
         .found
         .insert_if(codec::is_between(&kept, &seen), Warning::Compressed);
-    let note = (!notes.is_empty()).then(|| notes.join("\n"));
-    lines.run(feed, kept, more, note, to)
+    lines.run(feed, kept, more, notes, to)
 }
 
 /// A region as the user gives it: in the picture as it was.
@@ -121,7 +118,7 @@ fn told(region: &Region, camera: &Camera) -> String {
 }
 
 /// The frames to learn from, and whether more follow.
-fn keep_first(feed: &mut Feed) -> (Vec<Frame>, Result<bool, Failure>) {
+fn keep_first(feed: &mut Feed) -> (Vec<Frame>, Result<bool, ClipError>) {
     let (width, height) = feed.camera.size;
     let most = (LEARN_BYTES / (width * height)).clamp(2, LEARN_FRAMES);
     let mut kept = Vec::new();
@@ -129,7 +126,7 @@ fn keep_first(feed: &mut Feed) -> (Vec<Frame>, Result<bool, Failure>) {
         match feed.next_frame() {
             Ok(Some(frame)) => kept.push(frame),
             Ok(None) => return (kept, Ok(false)),
-            Err(failure) => return (kept, Err(failure)),
+            Err(error) => return (kept, Err(error)),
         }
     }
     (kept, Ok(true))
@@ -162,14 +159,17 @@ impl<'a> Lines<'a> {
         groups: Option<Group>,
         memory: &'a mut TrackerMemory,
         still_memory: Option<&'a mut TrackerMemory>,
-    ) -> Result<Self, Failure> {
+    ) -> Result<Self, MeasureError> {
         let camera = &feed.camera;
         let learn = LEARN_FRAMES as u16;
         let axes = super::axes_of_both(&part, camera);
         let engine = |part, group, memory| {
             let (timing, bits) = (camera.timing, camera.bits);
             let wanted = Wanted { axes, group };
-            Engine::new(part, timing, wanted, bits, learn, memory, &feed.name)
+            Engine::new(part, timing, wanted, bits, learn, memory).map_err(|why| {
+                let name = feed.name.clone();
+                MeasureError::Part { name, why }
+            })
         };
         let columns = Rect {
             x: region.columns.start,
@@ -231,27 +231,28 @@ impl<'a> Lines<'a> {
         &mut self,
         feed: &mut Feed,
         kept: Vec<Frame>,
-        mut more: Result<bool, Failure>,
-        mut note: Option<String>,
+        mut more: Result<bool, ClipError>,
+        mut notes: Vec<String>,
         to: &mut Outlet<FrameShifts, Ending>,
     ) -> Ending {
         for frame in kept {
-            if !self.measure(feed, frame, note.take(), to)? {
+            if !self.measure(feed, frame, std::mem::take(&mut notes), to)? {
                 return Ok(None);
             }
         }
         while let Ok(true) = more {
             match feed.next_frame() {
                 Ok(Some(frame)) => {
-                    if !self.measure(feed, frame, None, to)? {
+                    if !self.measure(feed, frame, Vec::new(), to)? {
                         return Ok(None);
                     }
                 }
                 Ok(None) => more = Ok(false),
-                Err(failure) => more = Err(failure),
+                Err(error) => more = Err(error),
             }
         }
-        more.map(|_| feed.warning().map(str::to_owned))
+        more?;
+        Ok(feed.warning().map(str::to_owned))
     }
 
     /// Measures a frame and sends what came of it. `false` when nobody listens any more.
@@ -262,15 +263,15 @@ impl<'a> Lines<'a> {
         &mut self,
         feed: &mut Feed,
         frame: Frame,
-        note: Option<String>,
+        notes: Vec<String>,
         to: &mut Outlet<FrameShifts, Ending>,
-    ) -> Result<bool, Failure> {
+    ) -> Result<bool, MeasureError> {
         let Some(mut shifts) = to.spare() else {
             return Ok(false);
         };
         shifts.number = frame.number;
         shifts.start_ns = frame.start_ns;
-        shifts.note = note;
+        shifts.notes = notes;
         shifts.chosen = self.chosen.take();
         shifts.warnings = std::mem::take(&mut self.found);
         shifts.rows.clear();
@@ -294,12 +295,12 @@ impl<'a> Lines<'a> {
                 }
             }
         }
-        if self.moving.slipped() && !self.slips_told && shifts.note.is_none() {
+        if self.moving.slipped() && !self.slips_told && shifts.notes.is_empty() {
             self.slips_told = true;
-            shifts.note = Some(SLIPPED.to_owned());
+            shifts.notes.push(SLIPPED.to_owned());
         }
         if frame.is_cut() {
-            return Err(feed.cut_short(&frame));
+            return Err(feed.cut_short(&frame).into());
         }
         feed.recycle(frame);
         Ok(to.put(shifts))

@@ -21,19 +21,16 @@ use rowtone::tracker::Axes;
 pub use background::subtract;
 pub use engine::{Engine, Wanted};
 
+use crate::MeasureError;
 use crate::memory::TrackerMemory;
 use rowtone_clip::ring::{Inlet, Next, ring};
 use rowtone_clip::{Camera, Feed, Rect};
-use rowtone_failure::Failure;
 
 /// Blocks of displacements on their way: the lines go on while a report is computed, which takes a millisecond or two,
 /// of as much as a hundred frames.
 const BLOCKS: usize = 4;
 /// Frames of a block, where nobody waits for each.
 const BLOCK_FRAMES: usize = 32;
-
-/// A part narrower than this has hardly a column whose surroundings stay in it while it moves, px.
-const NARROW_PX: usize = 32;
 
 /// What the lines of one frame came to.
 #[derive(Debug, Default)]
@@ -51,8 +48,8 @@ pub struct FrameShifts {
     pub chosen: Option<Chosen>,
     /// What was found out about the recording, from this frame on.
     warnings: Warnings,
-    /// Something to tell the user at once, a line each.
-    note: Option<String>,
+    /// Something to tell the user at once, a line each, without the recording's name.
+    pub notes: Vec<String>,
 }
 
 /// What is measured of the picture, and what was seen on the way to it.
@@ -65,7 +62,7 @@ pub struct Chosen {
 }
 
 /// How the lines ended, with the warning that the user is told in the end.
-type Ending = Result<Option<String>, Failure>;
+type Ending = Result<Option<String>, MeasureError>;
 
 /// The displacements of a recording, frame by frame.
 #[derive(Debug)]
@@ -82,8 +79,6 @@ pub struct Shifts {
     pub frames: Option<u64>,
     /// What to call the recording in messages.
     pub name: String,
-    /// What was chosen for the user is not told on standard error.
-    pub quiet: bool,
 }
 
 /// What both the part and the background can be measured along.
@@ -99,8 +94,8 @@ impl Shifts {
     /// Starts tracking. Rows are delivered one by one, or combined to samples in these groups.
     ///
     /// # Errors
-    /// [`Failure`] when the part to measure cannot be measured.
-    pub fn start(feed: Feed, groups: Option<Group>) -> Result<Self, Failure> {
+    /// [`MeasureError`] when the part to measure cannot be measured.
+    pub fn start(feed: Feed, groups: Option<Group>) -> Result<Self, MeasureError> {
         let camera = feed.camera.clone();
         let part = camera.part_or_rest()?;
         let block = if feed.frames.is_some() {
@@ -117,7 +112,10 @@ impl Shifts {
             let mut memory = TrackerMemory::for_axes(part.width, part.height, axes);
             let (timing, bits) = (camera.timing, camera.bits);
             let wanted = Wanted { axes, group: None };
-            Engine::new(part, timing, wanted, bits, 1, &mut memory, &name)?;
+            Engine::new(part, timing, wanted, bits, 1, &mut memory).map_err(|why| {
+                let name = name.clone();
+                MeasureError::Part { name, why }
+            })?;
         }
         std::thread::spawn(move || lines::run(feed, part, groups, outlet));
         Ok(Self {
@@ -128,26 +126,18 @@ impl Shifts {
             part,
             frames,
             name,
-            quiet: false,
         })
     }
 
     /// The next frame's displacements; `None` after the last.
     ///
     /// # Errors
-    /// [`Failure::Input`] when the input turns out to be unusable at this point; what came before was
+    /// [`MeasureError::Clip`] when the input turns out to be unusable at this point; what came before was
     /// good.
-    pub fn next_frame(&mut self) -> Result<Option<FrameShifts>, Failure> {
+    pub fn next_frame(&mut self) -> Result<Option<FrameShifts>, MeasureError> {
         match self.inlet.receive() {
-            Next::Item(mut frame) => {
+            Next::Item(frame) => {
                 self.camera.warnings = self.camera.warnings.union(frame.warnings);
-                if let Some(note) = frame.note.take()
-                    && !self.quiet
-                {
-                    for note in note.lines() {
-                        eprintln!("rowtone: {}: {note}", self.name);
-                    }
-                }
                 Ok(Some(frame))
             }
             Next::End(ending) => {
@@ -159,17 +149,11 @@ impl Shifts {
     }
 
     /// What to say when no row of the recording could be measured.
-    pub fn nothing_measured(&self) -> Failure {
-        let Rect { width, height, .. } = self.part;
-        let why = if width < NARROW_PX {
-            format!(
-                "the part of {width}x{height} px is too narrow, since some ten columns at either edge only \
-                 tell what moves in: make it at least {NARROW_PX} px wide (--roi)"
-            )
-        } else {
-            "the picture has too little texture across: edges, print, scratches or speckle are what moves".to_owned()
-        };
-        Failure::input(format!("{}: no row could be measured: {why}", self.name))
+    pub fn nothing_measured(&self) -> MeasureError {
+        MeasureError::NothingMeasured {
+            name: self.name.clone(),
+            part: self.part,
+        }
     }
 
     /// Gives a frame's buffers back.

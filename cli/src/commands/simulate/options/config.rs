@@ -4,9 +4,9 @@ use std::path::Path;
 
 use super::{Args, CameraOptions, SceneOptions};
 use crate::commands::simulate::forms;
+use crate::failure::Failure;
 use host_sim::{Config, Defects, Led, Optics, Preset, Scene, Sensor, Sound};
 use rowtone_calibrate::file::RollingName;
-use rowtone_failure::Failure;
 
 impl Args {
     /// The configuration asked for, not yet checked.

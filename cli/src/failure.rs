@@ -3,13 +3,20 @@
 use std::fmt;
 use std::io;
 
+use rowtone_clip::{ClipError, OptionError};
+#[cfg(feature = "lab")]
+use rowtone_lab::LabError;
+use rowtone_measure::MeasureError;
+use rowtone_plot::PlotError;
+use rowtone_serial::SerialError;
+
 /// Why a command stopped before its work was done.
 ///
 /// The text says what is wrong, where, and what to do about it, in one line and without the
-/// program's name: `rowtone_cli::commands::main` prints `rowtone: ` in front of it.
+/// program's name: [`crate::commands::main`] prints `rowtone: ` in front of it.
 ///
 /// ```
-/// use rowtone_failure::Failure;
+/// use rowtone_cli::failure::Failure;
 /// assert_eq!(Failure::input("clip.y4m: the file is empty").status(), 1);
 /// assert_eq!(Failure::usage("--roi wants X,Y,W,H").status(), 2);
 /// assert_eq!(Failure::OutputClosed.status(), 0);
@@ -74,6 +81,64 @@ impl fmt::Display for Failure {
 }
 
 impl std::error::Error for Failure {}
+
+impl From<OptionError> for Failure {
+    fn from(error: OptionError) -> Self {
+        Self::usage(error.to_string())
+    }
+}
+
+impl From<ClipError> for Failure {
+    fn from(error: ClipError) -> Self {
+        match error {
+            ClipError::Options(error) => error.into(),
+            _ => Self::input(error.to_string()),
+        }
+    }
+}
+
+impl From<MeasureError> for Failure {
+    fn from(error: MeasureError) -> Self {
+        match error {
+            MeasureError::Clip(error) => error.into(),
+            MeasureError::Settings(error) => Self::usage(error.to_string()),
+            _ => Self::input(error.to_string()),
+        }
+    }
+}
+
+/// A picture of `--plot`.
+impl From<PlotError> for Failure {
+    fn from(error: PlotError) -> Self {
+        match &error {
+            PlotError::Ending(_) => Self::usage(format!("--plot {error}")),
+            PlotError::Write { path, why } => Self::writing(&path.display().to_string(), why),
+            PlotError::Draw { .. } => Self::input(error.to_string()),
+        }
+    }
+}
+
+/// A port of `--serial`.
+impl From<SerialError> for Failure {
+    fn from(error: SerialError) -> Self {
+        match &error {
+            SerialError::Settings(_) => Self::usage(format!("--serial: {error}")),
+            _ => Self::input(error.to_string()),
+        }
+    }
+}
+
+#[cfg(feature = "lab")]
+impl From<LabError> for Failure {
+    fn from(error: LabError) -> Self {
+        match error {
+            LabError::Measure(error) => error.into(),
+            LabError::Simulation(_) | LabError::Timing(_) => Self::usage(error.to_string()),
+            LabError::Write { path, why } => Self::writing(&path.display().to_string(), &why),
+            _ => Self::input(error.to_string()),
+        }
+    }
+}
 
 #[cfg(test)]
 mod tests {
