@@ -24,8 +24,9 @@ use static_cell::{ConstStaticCell, StaticCell};
 /// The RP2350 has room for a picture of 320 x 240; a narrower one may have more rows here.
 static LINES: ConstStaticCell<StaticStorage<{ 320 * 240 }, 480, MAX_WIDTH>> =
     ConstStaticCell::new(StaticStorage::new());
-/// What measuring along both axes needs besides.
-static VERTICAL: ConstStaticCell<StaticVerticalStorage<{ 320 * 240 }, 480, MAX_WIDTH>> =
+/// What measuring along both axes needs besides; its coefficients, a byte a pixel, lie where a picture of 256 x 225 or less
+/// leaves room for them in that memory.
+static VERTICAL: ConstStaticCell<StaticVerticalStorage<0, 240, MAX_WIDTH>> =
     ConstStaticCell::new(StaticVerticalStorage::new());
 static SPECTRUM: ConstStaticCell<SpectrumMemory> = ConstStaticCell::new(SpectrumMemory::new());
 static REPORTS: StaticCell<ReportSide<'static>> = StaticCell::new();
@@ -62,7 +63,13 @@ fn run(args: &Args, uart: &mut Uart) -> Result<(), Failure> {
     let mut lent = LINES.take().lend();
     if args.both_axes {
         tracking.axes = Axes::Xy;
-        lent = lent.with_vertical(VERTICAL.take().lend());
+        let pixels = usize::from(clip.width) * usize::from(clip.rows);
+        let whole = core::mem::take(&mut lent.mean);
+        let (mean, rest) = whole.split_at_mut(pixels.min(whole.len()));
+        lent.mean = mean;
+        let mut vertical = VERTICAL.take().lend();
+        vertical.coefficients = bytemuck::cast_slice_mut(rest);
+        lent = lent.with_vertical(vertical);
     }
     let config = spectrum::Config {
         window_ns,
