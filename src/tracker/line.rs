@@ -130,6 +130,7 @@ impl Tracker<'_> {
         sums: Sums,
     ) -> Result<Place, Rejected> {
         if let Some(place) = self.take_fast_planar(line, &pixels, true) {
+            self.work_after_fast::<R::P>(line);
             return Ok(place);
         }
         match self.take_with_background(line, &mut pixels, sums, true) {
@@ -148,6 +149,7 @@ impl Tracker<'_> {
         binner: &mut Binner,
     ) -> Option<Sample> {
         if self.take_fast_planar(line, &pixels, false).is_some() {
+            self.work_after_fast::<R::P>(line);
             return self.pass_on_planar(line, binner);
         }
         let place = match self.take_with_background(line, &mut pixels, sums, false) {
@@ -368,7 +370,7 @@ impl Tracker<'_> {
             self.planar.fast = FastRows {
                 frame,
                 until_row: match self.planar.is_here() {
-                    true => self.schedule.fast_path.until_row,
+                    true => self.schedule.fast_path.background_until_row,
                     false => 0,
                 },
             };
@@ -387,6 +389,17 @@ impl Tracker<'_> {
         self.search_elsewhere();
         self.schedule.background = self.store.is_busy() || self.check.is_searching();
         aside_px
+    }
+
+    /// The background job of a line that took the fast path of both axes: the reference is not being moved.
+    #[inline(always)]
+    fn work_after_fast<P: Pixel>(&mut self, line: &Line<'_>) {
+        if self.schedule.background {
+            self.work_in_background::<P>(usize::from(line.row));
+            if self.store.is_moving() {
+                self.planar.fast = FastRows::default();
+            }
+        }
     }
 
     /// A lost line is searched for at the next start.

@@ -374,6 +374,9 @@ impl Tracker<'_> {
             return None;
         }
         let row = usize::from(line.row);
+        if row >= self.schedule.next_check {
+            return None;
+        }
         let (table, vertical_table) = (self.store.table(row)?, self.store.vertical_table(row)?);
         if !table.has_texture() {
             return None;
