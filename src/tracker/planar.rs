@@ -53,8 +53,6 @@ pub(super) struct Planar {
     information: f32,
     /// Where the present line seems to be along the columns, px.
     near_px: f32,
-    /// How much of that its first product takes for a shift to the right, px.
-    pub(super) lean_px: f32,
     /// A sixth of the curvatures along x and y, 1/px².
     bend: [f32; 2],
     /// By how many whole rows the picture lies below its reference; `down_px` and `near_px` come on top.
@@ -71,6 +69,16 @@ pub(super) struct Planar {
     /// What the last line that was measured came to.
     first: Place,
     vertical: Vertical,
+}
+
+/// Where a line seems to be along the columns.
+#[derive(Clone, Copy, Debug)]
+struct Near {
+    px: f32,
+    /// How much of that its first product takes for a shift to the right, px.
+    lean_px: f32,
+    /// What will be known then of where rows lead, 1/px².
+    information: f32,
 }
 
 impl Planar {
@@ -118,7 +126,7 @@ impl Planar {
     /// A line of this row whose second product, at the reference's brightness, is `second`, while it is about `right_px` from
     /// the whole shift that it is read at: where it seems to be along the columns, and what is known of that.
     #[inline(always)]
-    fn approach(&mut self, right_px: f32, second: f32, table: &VerticalTable) -> f32 {
+    fn approach(&self, right_px: f32, second: f32, table: &VerticalTable) -> Near {
         let seen = table.shift_px(second, [right_px, self.down_px]);
         let own = table.information_per_px2();
         let before = self.information * KEEP;
@@ -129,21 +137,27 @@ impl Planar {
         };
         let information = before + own;
         // Of a row that knows nothing nothing comes.
-        self.near_px = self.down_px + (seen - self.down_px) * (own / at_least_1(information));
-        self.lean_px = table.lean_px([right_px, self.near_px]);
-        information
+        let px = self.down_px + (seen - self.down_px) * (own / at_least_1(information));
+        Near {
+            px,
+            lean_px: table.lean_px([right_px, px]),
+            information,
+        }
     }
 
     /// Before anything is known of a line: it is where those before led.
-    fn expect(&mut self, right_px: f32, table: &VerticalTable) {
-        self.near_px = self.down_px;
-        self.lean_px = table.lean_px([right_px, self.near_px]);
+    fn expect(&self, right_px: f32, table: &VerticalTable) -> Near {
+        Near {
+            px: self.down_px,
+            lean_px: table.lean_px([right_px, self.down_px]),
+            information: self.information,
+        }
     }
 
     /// The line fits.
     #[inline(always)]
-    fn accept(&mut self, information: f32) {
-        self.information = information;
+    fn accept(&mut self, near: Near) {
+        (self.near_px, self.information) = (near.px, near.information);
         // What is no number is not near either.
         let near = self.near_px.abs() <= MOST_PX;
         self.down_px = if near { self.near_px } else { 0.0 };
@@ -170,14 +184,20 @@ impl Planar {
     /// What both products of a line say. `upright_px`: what the first one read as if the line had moved along its row alone,
     /// from the whole shift nearest to it on; `second`: the second product at the reference's brightness.
     #[inline(always)]
-    fn settle(&self, upright_px: f32, second: f32, table: &VerticalTable) -> (f32, Vertical) {
-        let near = [upright_px, self.near_px];
+    fn settle(
+        &self,
+        upright_px: f32,
+        near_px: f32,
+        second: f32,
+        table: &VerticalTable,
+    ) -> (f32, Vertical) {
+        let near = [upright_px, near_px];
         let [square_x, square_y] = near.map(|v| v * v);
         let coupling = table.coupling();
-        let lean = coupling * self.near_px;
+        let lean = coupling * near_px;
         let [bend_x, bend_y] = self.bend;
         let right = upright_px * (1.0 + bend_y * square_y) + 3.0 * bend_x * square_x * lean;
-        let down = table.shift_px(second, near) + self.near_px * bend_x * square_x;
+        let down = table.shift_px(second, near) + near_px * bend_x * square_x;
         let vertical = Vertical {
             shift_px: down,
             information_per_px2: table.information_per_px2(),
@@ -253,13 +273,12 @@ impl Tracker<'_> {
             true => self.second_product(row, pixels, whole),
             false => None,
         };
-        match second {
-            Some(second) => {
-                self.planar.approach(near, second, table);
-            }
+        let near = match second {
+            Some(second) => self.planar.approach(near, second, table),
             None => self.planar.expect(near, table),
-        }
-        self.correlator.lean_px = self.planar.lean_px;
+        };
+        self.planar.near_px = near.px;
+        self.correlator.lean_px = near.lean_px;
     }
 
     /// The second half of a line that was found at `shift_px` along its row; where it is, what it leads to along the columns
@@ -278,14 +297,14 @@ impl Tracker<'_> {
             return Err(Rejected::NoTexture);
         };
         let near = shift_px - whole as f32;
-        let (lean_px, mut planar) = (self.planar.lean_px, self.planar);
-        let information = planar.approach(near, second, vertical_table);
-        let upright = near + lean_px - planar.lean_px;
-        let (first, vertical) = planar.settle(upright, second, vertical_table);
+        let mut planar = self.planar;
+        let there = planar.approach(near, second, vertical_table);
+        let upright = near + self.correlator.lean_px - there.lean_px;
+        let (first, vertical) = planar.settle(upright, there.px, second, vertical_table);
         if !(first + vertical.shift_px).is_finite() {
             return Err(Rejected::NoTexture);
         }
-        planar.accept(information);
+        planar.accept(there);
         let rows = planar.whole as f32;
         planar.first = Place {
             shift_px: whole as f32 - aside_px + first + vertical.coupling * rows,
@@ -387,10 +406,10 @@ impl Tracker<'_> {
             self.store.vertical_coefficients(row)?,
         );
         let to_reference = table.factor_to_reference(sum);
-        let mut planar = self.planar;
+        let planar = &self.planar;
         let second = second * to_reference;
-        let information = planar.approach(self.prediction.predicted_px(), second, vertical_table);
-        let upright_px = table.shift_of_leaning_px(first * to_reference, planar.lean_px);
+        let near = planar.approach(self.prediction.predicted_px(), second, vertical_table);
+        let upright_px = table.shift_of_leaning_px(first * to_reference, near.lean_px);
         let surprise_px = upright_px - self.prediction.predicted_px();
         let small =
             upright_px.abs() <= self.correlator.near_px && Prediction::is_small(surprise_px);
@@ -399,21 +418,22 @@ impl Tracker<'_> {
         if !small || repeated || !self.light.may_become(to_reference) {
             return None;
         }
-        let (shift_px, vertical) = planar.settle(upright_px, second, vertical_table);
+        let (shift_px, vertical) = planar.settle(upright_px, near.px, second, vertical_table);
         let information_per_px2 = table.information_per_px2();
         // Not true of what is no number.
         let known = vertical.shift_px.abs() < f32::MAX;
         if !known {
             return None;
         }
-        planar.accept(information);
+        let planar = &mut self.planar;
+        planar.accept(near);
         planar.step(self.config.stride);
         planar.vertical = vertical;
         planar.first = Place {
             shift_px,
             information_per_px2,
         };
-        self.planar = planar;
+        let place = planar.first;
         self.store.set_print(row, print);
         if times {
             self.light.add_settled(to_reference);
@@ -422,7 +442,7 @@ impl Tracker<'_> {
         self.prediction
             .add_at_rest(surprise_px, information_per_px2);
         self.counts.measured = self.counts.measured.wrapping_add(1);
-        Some(planar.first)
+        Some(place)
     }
 
     /// What the line that was measured last is to others.
