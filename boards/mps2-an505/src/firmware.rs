@@ -24,7 +24,7 @@ use static_cell::{ConstStaticCell, StaticCell};
 /// The RP2350 has room for a picture of 320 x 240; a narrower one may have more rows here.
 static LINES: ConstStaticCell<StaticStorage<{ 320 * 240 }, 480, MAX_WIDTH>> =
     ConstStaticCell::new(StaticStorage::new());
-/// What measuring along both axes needs besides; its coefficients, a byte a pixel, lie where a picture of 256 x 225 or less
+/// What measuring along both axes needs besides; its coefficients, a byte a pixel, lie where a picture of 256 x 200 or less
 /// leaves room for them in that memory.
 static VERTICAL: ConstStaticCell<StaticVerticalStorage<0, 240, MAX_WIDTH>> =
     ConstStaticCell::new(StaticVerticalStorage::new());
