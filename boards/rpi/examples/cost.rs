@@ -19,7 +19,7 @@ use rowtone_rpi::capture::{Frame, Shape, Source};
 use rowtone_rpi::clock::FrameClock;
 use rowtone_rpi::config::Config;
 use rowtone_rpi::lines::Lines;
-use rowtone_rpi::memory::{SpectrumMemory, TrackerMemory};
+use rowtone_rpi::memory::Memory;
 use rowtone_rpi::setup::Setup;
 
 /// Frames that go round: so few that they stay in the processor's cache, and so many that they do not, as a camera's
@@ -169,12 +169,11 @@ fn core_alone(setup: &Setup, frames: &[(i64, Vec<u8>)], rounds: usize) -> Best {
         }
     }
     let rows = usize::from(setup.part.height);
-    let mut tracker_memory = TrackerMemory::new(setup.part.width, setup.part.height);
-    let mut spectrum_memory = SpectrumMemory::new(setup.group, setup.window_frames);
-    let (picture, _) = tracker_memory.lend();
+    let mut memory = Memory::new(setup);
+    let ((picture, _), storage) = memory.lend();
     let mut lines = LineSide::new(setup.tracker, setup.group, picture).expect("good");
-    let collected = spectrum_memory.lend().collected;
-    let mut collector = Collector::new(&setup.spectrum, setup.group, collected).expect("good");
+    let mut collector =
+        Collector::new(&setup.spectrum, setup.group, storage.collected).expect("good");
     let timing = setup.group.timing();
     let mut number = 0;
     let period = frames[1].0 - frames[0].0;
@@ -204,12 +203,11 @@ fn core_alone(setup: &Setup, frames: &[(i64, Vec<u8>)], rounds: usize) -> Best {
 }
 
 fn whole_path(setup: &Setup, frames: &[(i64, Vec<u8>)], rounds: usize) -> Best {
-    let mut tracker_memory = TrackerMemory::new(setup.part.width, setup.part.height);
-    let mut spectrum_memory = SpectrumMemory::new(setup.group, setup.window_frames);
+    let mut memory = Memory::new(setup);
+    let (tracker, storage) = memory.lend();
     let period = frames[1].0 - frames[0].0;
     let clock = FrameClock::new(None, Some(period));
-    let collected = spectrum_memory.lend().collected;
-    let mut lines = Lines::new(setup, clock, tracker_memory.lend(), collected).expect("good");
+    let mut lines = Lines::new(setup, clock, tracker, storage.collected).expect("good");
     let mut sequence = 0;
     Best::of(rounds, || {
         for (_, bytes) in frames {

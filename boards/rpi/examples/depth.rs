@@ -15,7 +15,7 @@ use rowtone_rpi::capture::{Facts, Frame, Shape, Source};
 use rowtone_rpi::clock::FrameClock;
 use rowtone_rpi::config::Config;
 use rowtone_rpi::lines::Lines;
-use rowtone_rpi::memory::{SpectrumMemory, TrackerMemory};
+use rowtone_rpi::memory::Memory;
 use rowtone_rpi::setup::Setup;
 
 const WIDTH: usize = 320;
@@ -71,11 +71,10 @@ fn noise_px(frames: &[Vec<u8>], facts: &Facts, full_depth: bool) -> f32 {
     let text = format!("[camera]\nfull_depth = {full_depth}\nexposure_us = 1\nlearn_frames = 30");
     let config = Config::parse(&text, "example").expect("a good configuration");
     let setup = Setup::new(facts, &config, &config.settings).expect("a good setup");
-    let mut tracker = TrackerMemory::new(setup.part.width, setup.part.height);
-    let mut spectrum = SpectrumMemory::new(setup.group, setup.window_frames);
-    let storage = spectrum.lend();
+    let mut memory = Memory::new(&setup);
+    let (tracker, storage) = memory.lend();
     let clock = FrameClock::new(None, Some(PERIOD_NS));
-    let mut lines = Lines::new(&setup, clock, tracker.lend(), storage.collected).expect("good");
+    let mut lines = Lines::new(&setup, clock, tracker, storage.collected).expect("good");
     let mut reporter = Reporter::new(setup.spectrum, setup.group, storage.estimator).expect("good");
     let mut noise = f32::NAN;
     for (sequence, bytes) in (0..).zip(frames) {

@@ -20,7 +20,7 @@ use crate::clock::{FrameClock, FrameCounts};
 use crate::config::{Config, USUAL_HIGHEST_HZ};
 use crate::journal::log;
 use crate::lines::{Lines, LinesError};
-use crate::memory::{SpectrumMemory, TrackerMemory};
+use crate::memory::Memory;
 use crate::notify::Notifier;
 use crate::setup::Setup;
 
@@ -109,15 +109,14 @@ pub fn run(
     reports: &SyncSender<Report>,
     notifier: &Notifier,
 ) -> Result<(Ended, FrameCounts), LinesError> {
-    let mut tracker_memory = TrackerMemory::new(setup.part.width, setup.part.height);
-    let mut spectrum_memory = SpectrumMemory::new(setup.group, setup.window_frames);
-    let storage = spectrum_memory.lend();
+    let mut memory = Memory::new(setup);
+    let (tracker, storage) = memory.lend();
     let reporter = Reporter::new(setup.spectrum, setup.group, storage.estimator);
     let reporter = Mutex::new(reporter.map_err(LinesError::Spectrum)?);
     let period_ns = source.facts().frame_period_ns;
     let clock = FrameClock::new(config.camera.replay, period_ns);
     let mut rates = FrameRates::new(setup, config, period_ns);
-    let mut lines = Lines::new(setup, clock, tracker_memory.lend(), storage.collected)?;
+    let mut lines = Lines::new(setup, clock, tracker, storage.collected)?;
     let (ready, windows) = sync_channel(1);
     let ended = std::thread::scope(|scope| {
         let reporter = &reporter;

@@ -13,7 +13,7 @@ use rowtone_rpi::capture::{CameraError, Source};
 use rowtone_rpi::clock::FrameClock;
 use rowtone_rpi::config::Config;
 use rowtone_rpi::lines::Lines;
-use rowtone_rpi::memory::{SpectrumMemory, TrackerMemory};
+use rowtone_rpi::memory::Memory;
 use rowtone_rpi::run;
 use rowtone_rpi::session::Shared;
 use rowtone_rpi::setup::Setup;
@@ -319,11 +319,10 @@ fn the_line_path_allocates_nothing_once_it_runs() {
     let scene = scene();
     let mut source = Simulated::new(scene);
     let setup = Setup::new(source.facts(), &config, &config.settings).unwrap();
-    let mut tracker = TrackerMemory::new(setup.part.width, setup.part.height);
-    let mut spectrum = SpectrumMemory::new(setup.group, setup.window_frames);
-    let storage = spectrum.lend();
+    let mut memory = Memory::new(&setup);
+    let (tracker, storage) = memory.lend();
     let clock = FrameClock::new(None, source.facts().frame_period_ns);
-    let mut lines = Lines::new(&setup, clock, tracker.lend(), storage.collected).unwrap();
+    let mut lines = Lines::new(&setup, clock, tracker, storage.collected).unwrap();
     let mut reporter =
         rowtone::pipeline::Reporter::new(setup.spectrum, setup.group, storage.estimator).unwrap();
     // The camera draws its first frame into new memory.

@@ -11,10 +11,10 @@ use rowtone::timeline::{Group, Sample, Tally, rows_per_sample};
 use rowtone::tracker::Axes;
 
 use crate::MeasureError;
-use crate::memory::SpectrumMemory;
 use crate::tracking::{FrameShifts, Shifts};
 use crate::wander::Wander;
 use rowtone_clip::{Camera, Rect};
+use rowtone_memory::SpectrumMemory;
 
 /// Highest frequency that is looked for when none is given, Hz: beyond what machines do as a rule, and
 /// few enough samples.
@@ -112,11 +112,7 @@ impl Plan {
 
     /// The memory that the analysis borrows.
     pub fn memory(&self) -> SpectrumMemory {
-        let memory = match self.axes {
-            Axes::X => SpectrumMemory::new,
-            Axes::Xy => SpectrumMemory::along_both,
-        };
-        memory(self.group, self.window_s, self.fps)
+        SpectrumMemory::for_axes(self.axes, self.group, self.window_s, self.fps)
     }
 
     /// Highest frequency that can be reported, Hz.

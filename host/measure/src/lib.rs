@@ -1,12 +1,11 @@
 //! The core driven from a recording.
 //!
 //! - [`tracking`]: frames to displacements, on a thread of its own;
-//! - [`analysis`]: displacements to reports, in the memory that [`memory`] lends;
+//! - [`analysis`]: displacements to reports, in memory that it lends;
 //! - [`restore`]: gaps filled, for the ear.
 
 pub mod analysis;
 mod error;
-pub mod memory;
 pub mod restore;
 pub mod tracking;
 mod wander;

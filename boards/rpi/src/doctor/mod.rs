@@ -12,7 +12,7 @@ use crate::capture::{CameraError, Source};
 use crate::clock::FrameClock;
 use crate::config::Config;
 use crate::lines::Lines;
-use crate::memory::{SpectrumMemory, TrackerMemory};
+use crate::memory::Memory;
 use crate::setup::Setup;
 
 /// How long the camera is watched at most.
@@ -93,11 +93,10 @@ fn watch(source: &mut dyn Source, config: &Config, findings: &mut Findings) {
             findings.ok(remark);
         }
     }
-    let mut tracker_memory = TrackerMemory::new(setup.part.width, setup.part.height);
-    let mut spectrum_memory = SpectrumMemory::new(setup.group, setup.window_frames);
+    let mut memory = Memory::new(&setup);
     let clock = FrameClock::new(config.camera.replay, facts.frame_period_ns);
-    let storage = spectrum_memory.lend();
-    let mut lines = match Lines::new(&setup, clock, tracker_memory.lend(), storage.collected) {
+    let (tracker, storage) = memory.lend();
+    let mut lines = match Lines::new(&setup, clock, tracker, storage.collected) {
         Ok(lines) => lines,
         Err(e) => return findings.bad(&format!("setup: {e}")),
     };

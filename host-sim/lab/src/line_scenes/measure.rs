@@ -8,8 +8,8 @@ use rowtone::tracker::{Config, ConfigError, Outcome, Tracker};
 
 use super::case::Case;
 use host_sim::{Camera, Frame, SimError, crlb};
-use rowtone_measure::memory::{SpectrumMemory, TrackerMemory};
 use rowtone_measure::tracking::subtract;
+use rowtone_memory::{SpectrumMemory, TrackerMemory};
 
 /// What came of a recording.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

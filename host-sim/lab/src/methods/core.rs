@@ -4,7 +4,7 @@ use rowtone::camera::{Line, Pixels, Timing};
 use rowtone::tracker::{Config, Outcome, Stage, Tracker};
 
 use super::{Clip, Method, Shifts};
-use rowtone_measure::memory::TrackerMemory;
+use rowtone_memory::TrackerMemory;
 
 /// The core's tracker: two rounds of learning over all frames, then one inner product a line.
 #[derive(Clone, Copy, Debug)]

@@ -14,7 +14,7 @@ use rowtone::report::Report;
 use rowtone::spectrum::Config;
 use rowtone::timeline::{Group, Sample};
 
-use rowtone_measure::memory::SpectrumMemory;
+use rowtone_memory::SpectrumMemory;
 
 /// The tone, Hz: no whole number of turns in any round time.
 pub const HZ: f64 = 437.012_345;

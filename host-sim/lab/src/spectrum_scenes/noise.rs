@@ -10,7 +10,7 @@ use rowtone::timeline::{Group, Sample};
 
 use super::bound::Bound;
 use super::scene::Draw;
-use rowtone_measure::memory::SpectrumMemory;
+use rowtone_memory::SpectrumMemory;
 
 /// Standard deviation of a sample, px.
 pub const SAMPLE_NOISE_PX: f64 = 0.015;

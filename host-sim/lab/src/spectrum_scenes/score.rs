@@ -5,7 +5,7 @@ use rowtone::report::{Peak, Report};
 use rowtone::spectrum::Config;
 
 use super::scene::{Ranges, Scene, TrueTone, Truth};
-use rowtone_measure::memory::SpectrumMemory;
+use rowtone_memory::SpectrumMemory;
 
 /// A tone whose frequency or amplitude is so many bounds off has gone wrong.
 const FAR_OFF: f64 = 4.0;

@@ -8,8 +8,8 @@ use rowtone::timeline::{Displacement, Group};
 use rowtone::tracker::{Axes, Config, Outcome};
 
 use crate::PartError;
-use crate::memory::TrackerMemory;
 use rowtone_clip::{Frame, Rect};
+use rowtone_memory::TrackerMemory;
 
 /// A line side on one part of the picture.
 #[derive(Debug)]

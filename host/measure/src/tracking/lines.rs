@@ -10,9 +10,9 @@ use super::codec;
 use super::region::{self, Choice, Region};
 use super::{Chosen, Ending, Engine, FrameShifts, Wanted, background};
 use crate::MeasureError;
-use crate::memory::TrackerMemory;
 use rowtone_clip::ring::Outlet;
 use rowtone_clip::{Camera, ClipError, Feed, Frame, Rect};
+use rowtone_memory::TrackerMemory;
 
 /// Frames that the reference is learned from.
 const LEARN_FRAMES: usize = 30;

@@ -22,9 +22,9 @@ pub use background::subtract;
 pub use engine::{Engine, Wanted};
 
 use crate::MeasureError;
-use crate::memory::TrackerMemory;
 use rowtone_clip::ring::{Inlet, Next, ring};
 use rowtone_clip::{Camera, Feed, Rect};
+use rowtone_memory::TrackerMemory;
 
 /// Blocks of displacements on their way: the lines go on while a report is computed, which takes a millisecond or two,
 /// of as much as a hundred frames.

@@ -3,6 +3,7 @@
 use rowtone::report::MAX_PEAKS;
 use rowtone::spectrum::{EstimatorStorage, FrameMark, SampleBuffer, SlotCoupling, Storage};
 use rowtone::timeline::{Group, Spread};
+use rowtone::tracker::Axes;
 
 /// Longest transform, points: that of the core.
 const GRID: usize = 32_768;
@@ -10,7 +11,7 @@ const GRID: usize = 32_768;
 /// Vectors to lend to an [`rowtone::pipeline::ReportSide`].
 ///
 /// ```
-/// use rowtone_measure::memory::SpectrumMemory;
+/// use rowtone_memory::SpectrumMemory;
 /// use rowtone::{pipeline::ReportSide, camera::Timing, spectrum::Config, timeline::Group};
 /// let group = Group::new(Timing::new(18_900_000, 500_000, 1080)?, 24)?;
 /// let mut memory = SpectrumMemory::new(group, 1.0, 47.6);
@@ -64,19 +65,25 @@ impl Buffer {
 }
 
 impl SpectrumMemory {
-    /// Room for windows of `window_s` seconds at up to `fps` frames a second (and a quarter more, and two frames).
-    /// The samples know the motion along x alone.
+    /// Room for windows of `window_s` seconds at up to `fps` frames a second (and a quarter more, and two
+    /// frames). The samples know the motion along x alone.
     pub fn new(group: Group, window_s: f64, fps: f64) -> Self {
-        Self::along(1, group, window_s, fps)
+        Self::for_axes(Axes::X, group, window_s, fps)
     }
 
-    /// The same for samples that know the motion along both axes.
-    pub fn along_both(group: Group, window_s: f64, fps: f64) -> Self {
-        Self::along(2, group, window_s, fps)
-    }
-
-    fn along(axes: usize, group: Group, window_s: f64, fps: f64) -> Self {
+    /// The same for samples that know the motion along these axes.
+    pub fn for_axes(axes: Axes, group: Group, window_s: f64, fps: f64) -> Self {
         let frames = (window_s * fps * 1.25).clamp(4.0, 65_000.0) as usize + 2;
+        Self::for_frames(axes, group, frames)
+    }
+
+    /// Room for windows of this many frames, at least 4.
+    pub fn for_frames(axes: Axes, group: Group, frames: usize) -> Self {
+        let frames = frames.max(4);
+        let axes = match axes {
+            Axes::X => 1,
+            Axes::Xy => 2,
+        };
         let slots = usize::from(group.slots());
         let rows = MAX_PEAKS + 1;
         Self {
