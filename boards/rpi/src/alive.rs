@@ -5,7 +5,6 @@ use std::time::{Duration, Instant};
 
 use crate::journal::log;
 use crate::notify::Notifier;
-use crate::session::Shared;
 
 /// How much longer the start may take, each time that is said: a camera may come late, but a program
 /// that stands still is started anew.
@@ -75,7 +74,9 @@ impl Pulses {
 #[derive(Debug)]
 pub struct Alive<'a> {
     notifier: &'a Notifier,
-    shared: &'a Shared,
+    pulses: &'a Pulses,
+    /// When the program began.
+    began: Instant,
     /// As often as systemd wants to hear it; a thread that is late by as much stands still.
     every: Option<Duration>,
     told: Option<Instant>,
@@ -83,11 +84,12 @@ pub struct Alive<'a> {
 }
 
 impl<'a> Alive<'a> {
-    /// Tells this one.
-    pub fn new(notifier: &'a Notifier, shared: &'a Shared) -> Self {
+    /// Tells this one of the threads with these pulses, in a program that began then.
+    pub fn new(notifier: &'a Notifier, pulses: &'a Pulses, began: Instant) -> Self {
         Self {
             notifier,
-            shared,
+            pulses,
+            began,
             every: Notifier::watchdog(),
             told: None,
             complained: false,
@@ -100,7 +102,7 @@ impl<'a> Alive<'a> {
         if self.told.is_some_and(|at| at.elapsed() < every) {
             return;
         }
-        match self.shared.pulses.late(self.shared.started, every) {
+        match self.pulses.late(self.began, every) {
             None => {
                 self.notifier.say("WATCHDOG=1");
                 self.told = Some(Instant::now());

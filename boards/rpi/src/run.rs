@@ -143,7 +143,7 @@ fn measure(config: &Config, shared: &Shared, open: &mut Open<'_>, reports: SyncS
     }
     let mut backoff = Backoff::new(Duration::from_millis(500), Duration::from_secs(30));
     let mut ready = false;
-    let mut alive = Alive::new(&notifier, shared);
+    let mut alive = Alive::new(&notifier, &shared.pulses, shared.started);
     while !shared.is_stopping() {
         let outcome = open(config).map(|mut source| {
             if !ready {

@@ -167,7 +167,7 @@ fn lines_until_end(
     // Short waits, so that a stop is noticed soon.
     let patience = silence.min(Duration::from_millis(200));
     let mut heard = Instant::now();
-    let mut alive = Alive::new(notifier, shared);
+    let mut alive = Alive::new(notifier, &shared.pulses, shared.started);
     loop {
         if shared.is_stopping() {
             return Ended::Asked;
