@@ -9,13 +9,13 @@ mod wire_common;
 use rowtone::camera::{Line, Pixels, Timing};
 use rowtone::kernel::Kernel;
 use rowtone::link::Link;
-use rowtone::link::settings::Wire;
 use rowtone::link::settings::store::Nowhere;
 use rowtone::pipeline::{Collector, Pipeline, Reporter};
 use rowtone::report::Report;
 use rowtone::spectrum;
 use rowtone::timeline::Group;
 use rowtone::tracker::{self, Config, Outcome};
+use rowtone::wire::Format;
 use rowtone::wire::{Message, binary, text};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
@@ -123,7 +123,7 @@ fn nothing_is_allocated_from_lines_to_bytes() {
             let storage = halves.lend();
             let mut collector = Collector::new(&config, group, storage.collected).unwrap();
             let mut reporter = Reporter::new(config, group, storage.estimator).unwrap();
-            let mut link = link(&mut slots, Wire::Text);
+            let mut link = link(&mut slots, Format::Text);
             let (mut reports, mut bytes) = (0, 0);
             for frame in 0..FRAMES {
                 for row in 0..ROWS {
@@ -182,7 +182,7 @@ fn nothing_is_allocated_from_lines_to_bytes() {
         assert!(reports >= 3 && bytes > 100, "{reports} {bytes}");
     }
 
-    for wire in [Wire::Text, Wire::Binary, Wire::Modbus] {
+    for wire in [Format::Text, Format::Binary, Format::Modbus] {
         let (calls, said) = calls_of(|| {
             let mut link = link(&mut slots, wire);
             link.announce(0);

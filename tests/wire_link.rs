@@ -3,8 +3,8 @@
 mod wire_common;
 
 use rowtone::link::Link;
-use rowtone::link::settings::Wire;
 use rowtone::link::settings::store::Nowhere;
+use rowtone::wire::Format;
 use rowtone::wire::{Arrival, Message, Sequence, binary, text};
 use wire_common::console::link;
 use wire_common::{Dice, harm, ordinary_report};
@@ -34,7 +34,7 @@ fn type_in(link: &mut Link<'_>, line: &str) {
 #[test]
 fn a_stuck_line_drops_the_oldest_and_counts() {
     let mut slots = [const { None }; 4];
-    let mut link = link(&mut slots, Wire::Text);
+    let mut link = link(&mut slots, Format::Text);
     for seq in 0..10 {
         link.push(ordinary_report(seq));
         link.poll(0, &mut Nowhere); // says 0, but nothing of it is taken
@@ -61,7 +61,7 @@ fn a_stuck_line_drops_the_oldest_and_counts() {
 #[test]
 fn the_wire_can_be_changed_and_changed_back() {
     let mut slots = [const { None }; 4];
-    let mut link = link(&mut slots, Wire::Text);
+    let mut link = link(&mut slots, Format::Text);
     type_in(&mut link, "set wire binary\nset wire modbus\nget\nget\n");
     assert!(
         drain(&mut link).is_empty(),
@@ -83,7 +83,7 @@ fn the_wire_can_be_changed_and_changed_back() {
 /// every report, and never a wrong one.
 #[test]
 fn a_host_that_asks_again_misses_none() {
-    for wire in [Wire::Text, Wire::Binary] {
+    for wire in [Format::Text, Format::Binary] {
         let mut slots = [const { None }; 32];
         let mut link = link(&mut slots, wire);
         let mut dice = Dice::new(2026);
@@ -101,14 +101,14 @@ fn a_host_that_asks_again_misses_none() {
                 faults += u32::from(harm(&mut dice, &drain(&mut link), 2e-3, &mut received));
                 for byte in received {
                     let message = match wire {
-                        Wire::Text => text.push(byte).and_then(Result::ok),
+                        Format::Text => text.push(byte).and_then(Result::ok),
                         _ => binary.push(byte).and_then(Result::ok),
                     };
                     let Some(Message::Report { session, report }) = message else {
                         continue;
                     };
                     let mut sent = ordinary_report(report.seq);
-                    if wire == Wire::Text {
+                    if wire == Format::Text {
                         sent.noise_px = report.noise_px; // the rest is exact as well
                         sent.peaks = report.peaks.clone();
                     }
@@ -145,7 +145,7 @@ fn a_host_that_asks_again_misses_none() {
 #[test]
 fn its_own_sentences_are_no_commands() {
     let mut slots = [const { None }; 4];
-    let mut link = link(&mut slots, Wire::Text);
+    let mut link = link(&mut slots, Format::Text);
     link.announce(0);
     link.push(ordinary_report(0));
     type_in(&mut link, "get hop\nnonsense\n");

@@ -6,8 +6,9 @@ use proptest::prelude::*;
 use rmodbus::{ModbusProto, client::ModbusRequest};
 use rowtone::link::modbus::answer;
 use rowtone::link::settings::store::{Keep, Nowhere, SaveError};
-use rowtone::link::settings::{Console, Region, Settings, Wire};
+use rowtone::link::settings::{Console, Region, Settings};
 use rowtone::report::Report;
+use rowtone::wire::Format;
 use rowtone::wire::modbus::{State, decode_report};
 use rowtone::wire::{SettingsOrigin, Status};
 use wire_common::ordinary_report;
@@ -26,7 +27,7 @@ const STATUS: Status = Status {
 fn console() -> Console {
     let defaults = Settings {
         unit: 9,
-        wire: Wire::Modbus,
+        wire: Format::Modbus,
         ..Settings::default()
     };
     wire_common::console::console(1, defaults, SettingsOrigin::Saved)

@@ -14,8 +14,8 @@ mod wire_common;
 
 use std::time::Instant;
 
-use rowtone::link::settings::Wire;
 use rowtone::report::Report;
+use rowtone::wire::Format;
 use rowtone::wire::modbus::decode_report;
 use server::{Server, UNIT, read_holdings, read_inputs, registers, request};
 use wire_common::{Dice, harm, ordinary_report};
@@ -204,7 +204,7 @@ fn run_board(trials: u64, dice: &mut Dice, outcome: &mut Requests) {
         if after != before && after != wanted {
             outcome.wrong_settings += 1;
         }
-        if after.wire != Wire::Modbus || after.unit != UNIT {
+        if after.wire != Format::Modbus || after.unit != UNIT {
             return;
         }
         let heard = registers(&holdings_client, &server.ask(&holdings), 20);

@@ -17,7 +17,7 @@ use board::{Board, line};
 use common::{
     CAMERA, assert_failure, assert_the_tone, command, config, file, on_clip, reports, texts, y4m,
 };
-use rowtone::link::settings::Wire;
+use rowtone::wire::Format;
 use rowtone::wire::{Message, text as wire_text};
 use serialport::{SerialPort, TTYPort};
 
@@ -265,7 +265,7 @@ fn read_up_to(out: &mut BufReader<ChildStdout>, last: u64) -> Vec<u64> {
 #[test]
 fn monitor_asks_for_what_was_lost() {
     let _alone = alone();
-    for (wire, seed) in [(Wire::Text, 11), (Wire::Binary, 12)] {
+    for (wire, seed) in [(Format::Text, 11), (Format::Binary, 12)] {
         let board = Board::start(wire, Duration::from_millis(10), 1.0 / 3000.0, seed);
         let (mut child, mut out) = monitor(&board.port, &["--format", "json"]);
         let mut numbers = read_up_to(&mut out, 120);
@@ -299,7 +299,7 @@ fn a_log_survives_kill_9() {
         let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("killed.{ending}"));
         let _ = std::fs::remove_file(&path);
         let log = path.to_str().unwrap();
-        let board = Board::start(Wire::Text, Duration::from_millis(2), 0.0, 1);
+        let board = Board::start(Format::Text, Duration::from_millis(2), 0.0, 1);
         let mut shown = BTreeSet::new();
         for _ in 0..4 {
             let (mut child, mut out) = monitor(&board.port, &["--format", "json", "--log", log]);

@@ -6,7 +6,8 @@ use rowtone::link::Link;
 use rowtone::link::outbox::Outbox;
 use rowtone::report::Report;
 use rowtone::link::settings::store::{Nowhere, Started};
-use rowtone::link::settings::{Board, Console, Limits, Settings, Wire};
+use rowtone::link::settings::{Board, Console, Limits, Settings};
+use rowtone::wire::Format;
 use rowtone::wire::{Message, SettingsOrigin, binary, text};
 
 const LIMITS: Limits = Limits { width: 320, height: 240, min_width: 16, max_window_s: 10.0 };
@@ -25,7 +26,7 @@ fn report() -> Report {
 // A byte of 0xf0 and above does something; all others go to the board as they are.
 fuzz_target!(|data: &[u8]| {
     let Some((&first, data)) = data.split_first() else { return };
-    let wire = [Wire::Text, Wire::Binary, Wire::Modbus][usize::from(first) % 3];
+    let wire = [Format::Text, Format::Binary, Format::Modbus][usize::from(first) % 3];
     let board = Board { version: [0; 3], limits: LIMITS, defaults: Settings { wire, ..Settings::default() } };
     let started = Started { session: 1, settings: None, origin: SettingsOrigin::Defaults };
     let console = Console::new(board, started).expect("the defaults are valid");
@@ -64,7 +65,7 @@ fuzz_target!(|data: &[u8]| {
     assert_eq!(link.outbox().next_seq(), pushed);
 
     // Where it spoke one wire all the while, a host understands every word, and every report was sent or counted.
-    let was = |wanted: Wire| wire == wanted && link.console().settings().wire == wanted;
+    let was = |wanted: Format| wire == wanted && link.console().settings().wire == wanted;
     let switched = data.windows(4).any(|w| w == b"wire");
     let mut numbers = std::collections::BTreeSet::new();
     let mut take = |message| {
@@ -72,10 +73,10 @@ fuzz_target!(|data: &[u8]| {
             numbers.insert(report.seq);
         }
     };
-    if was(Wire::Text) && !switched {
+    if was(Format::Text) && !switched {
         let mut decoder = text::Decoder::<{ text::MAX_LINE }>::new();
         said.iter().filter_map(|&byte| decoder.push(byte)).for_each(|heard| take(heard.expect("a whole sentence")));
-    } else if was(Wire::Binary) && !switched {
+    } else if was(Format::Binary) && !switched {
         let mut decoder = binary::Decoder::<{ binary::MAX_FRAME }>::new();
         said.iter().filter_map(|&byte| decoder.push(byte)).for_each(|heard| take(heard.expect("a whole frame")));
     } else {

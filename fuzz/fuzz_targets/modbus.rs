@@ -3,7 +3,8 @@
 
 use libfuzzer_sys::fuzz_target;
 use rowtone::link::settings::store::{Nowhere, Started};
-use rowtone::link::settings::{Board, Console, Limits, Settings, Wire};
+use rowtone::link::settings::{Board, Console, Limits, Settings};
+use rowtone::wire::Format;
 use rowtone::link::modbus::answer;
 use rowtone::wire::modbus::{FrameReader, State, decode_report};
 use rowtone::wire::{SettingsOrigin, Status};
@@ -14,7 +15,7 @@ fuzz_target!(|data: &[u8]| {
     let registers: Vec<u16> = data.chunks_exact(2).map(|b| u16::from_be_bytes([b[0], b[1]])).collect();
     decode_report(|at| registers.get(usize::from(at)).copied());
 
-    let defaults = Settings { wire: Wire::Modbus, ..Settings::default() };
+    let defaults = Settings { wire: Format::Modbus, ..Settings::default() };
     let board = Board { version: [0; 3], limits: LIMITS, defaults };
     let started = Started { session: 1, settings: None, origin: SettingsOrigin::Defaults };
     let mut console = Console::new(board, started).expect("the defaults are valid");

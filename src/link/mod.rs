@@ -13,11 +13,11 @@ pub mod settings;
 
 use crate::report::Report;
 use crate::wire::modbus::{FrameReader, State};
-use crate::wire::{Message, binary, text};
+use crate::wire::{Format, Message, binary, text};
 use outbox::Outbox;
+use settings::Console;
 use settings::command::LineReader;
 use settings::store::Keep;
-use settings::{Console, Wire};
 
 /// Most answers that can wait for the line. A command that comes while so many wait is refused.
 pub const MAX_ANSWERS: usize = 2;
@@ -168,7 +168,7 @@ impl<'a> Link<'a> {
 
     fn is_modbus(&self) -> bool {
         // Settings with a wire that is left out do not pass their check.
-        cfg!(feature = "modbus") && self.console.settings().wire == Wire::Modbus
+        cfg!(feature = "modbus") && self.console.settings().wire == Format::Modbus
     }
 
     fn answer_frame(&mut self, now_us: u64, store: &mut impl Keep) {
@@ -200,17 +200,17 @@ impl<'a> Link<'a> {
 }
 
 /// Encodes a message; one that cannot be said leaves the buffer empty.
-fn write(wire: Wire, message: &Message, buffer: &mut Vec<u8, { text::MAX_LINE }>) {
+fn write(wire: Format, message: &Message, buffer: &mut Vec<u8, { text::MAX_LINE }>) {
     if buffer.resize_default(text::MAX_LINE).is_err() {
         return;
     }
     let used = match wire {
-        Wire::Text => text::encode_to_slice(message, buffer).map(<[u8]>::len),
-        Wire::Binary if cfg!(feature = "binary") => {
+        Format::Text => text::encode_to_slice(message, buffer).map(<[u8]>::len),
+        Format::Binary if cfg!(feature = "binary") => {
             binary::encode_to_slice(message, buffer).map(<[u8]>::len)
         }
         // No messages on these wires.
-        Wire::Binary | Wire::Modbus => Ok(0),
+        Format::Binary | Format::Modbus => Ok(0),
     };
     buffer.truncate(used.unwrap_or(0));
 }

@@ -16,6 +16,7 @@
 pub mod binary;
 mod check;
 mod decimal;
+mod format;
 mod message;
 pub mod modbus;
 mod sequence;
@@ -24,6 +25,7 @@ pub mod text;
 
 pub(crate) use check::CRC_32;
 pub use check::{EncodeError, MAX_VALUE, check_report};
+pub use format::Format;
 pub use message::{Message, REPLY_LEN, Reply, SettingsOrigin, Status};
 pub use sequence::{Arrival, Sequence};
 pub use slice::SliceWriter;

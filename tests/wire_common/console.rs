@@ -8,8 +8,9 @@
 use rowtone::link::Link;
 use rowtone::link::outbox::Outbox;
 use rowtone::link::settings::store::Started;
-use rowtone::link::settings::{Board, Console, Limits, Settings, Wire};
+use rowtone::link::settings::{Board, Console, Limits, Settings};
 use rowtone::report::Report;
+use rowtone::wire::Format;
 use rowtone::wire::SettingsOrigin;
 
 /// What the board can do.
@@ -36,7 +37,7 @@ pub fn console(session: u32, defaults: Settings, origin: SettingsOrigin) -> Cons
 }
 
 /// The board's end of a line of 115 200 baud in session 1, its reports in `slots`.
-pub fn link(slots: &mut [Option<Report>], wire: Wire) -> Link<'_> {
+pub fn link(slots: &mut [Option<Report>], wire: Format) -> Link<'_> {
     let defaults = Settings {
         wire,
         ..Settings::default()

@@ -8,9 +8,10 @@
 use rmodbus::{ModbusProto, client::ModbusRequest};
 use rowtone::link::Link;
 use rowtone::link::outbox::Outbox;
+use rowtone::link::settings::Settings;
 use rowtone::link::settings::store::Nowhere;
-use rowtone::link::settings::{Settings, Wire};
 use rowtone::report::Report;
+use rowtone::wire::Format;
 use rowtone::wire::SettingsOrigin;
 
 use crate::wire_common::console::console;
@@ -32,7 +33,7 @@ impl<'a> Server<'a> {
     pub fn new(slots: &'a mut [Option<Report>], baud: u32) -> Self {
         let defaults = Settings {
             unit: UNIT,
-            wire: Wire::Modbus,
+            wire: Format::Modbus,
             ..Settings::default()
         };
         let console = console(7, defaults, SettingsOrigin::Defaults);

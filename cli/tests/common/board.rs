@@ -13,9 +13,9 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use nix::fcntl::{FcntlArg, FdFlag, fcntl};
-use rowtone::link::settings::Wire;
 use rowtone::link::settings::store::Nowhere;
 use rowtone::report::{Peak, Report};
+use rowtone::wire::Format;
 use rowtone::wire::{Message, text};
 use serialport::{SerialPort, TTYPort};
 
@@ -89,7 +89,7 @@ struct Shared {
 
 impl Board {
     /// A report each `period`, on a cable that harms one byte in `1/rate`.
-    pub(crate) fn start(wire: Wire, period: Duration, rate: f64, seed: u64) -> Self {
+    pub(crate) fn start(wire: Format, period: Duration, rate: f64, seed: u64) -> Self {
         let (master, slave, port) = pair();
         let shared = Arc::new(Shared::default());
         let of_thread = Arc::clone(&shared);
@@ -131,7 +131,7 @@ impl Drop for Board {
 fn talk(
     mut port: TTYPort,
     shared: &Shared,
-    wire: Wire,
+    wire: Format,
     period: Duration,
     rate: f64,
     mut seed: u64,

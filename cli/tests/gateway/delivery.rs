@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::io::Write;
 use std::time::{Duration, Instant};
 
-use rowtone::link::settings::Wire;
+use rowtone::wire::Format;
 use serialport::TTYPort;
 
 use crate::board::{Board, line};
@@ -127,7 +127,7 @@ fn what_was_said_while_the_gateway_was_away_is_asked_for() {
     };
     let (_client, heard) = subscribe(broker.port, "plant/+/report");
     let period = Duration::from_millis(25);
-    let boards = [(Wire::Text, 5), (Wire::Binary, 6)]
+    let boards = [(Format::Text, 5), (Format::Binary, 6)]
         .map(|(wire, seed)| Board::start(wire, period, 1.0 / 3000.0, seed));
     let names: Vec<String> = boards.iter().map(|board| board.port.clone()).collect();
     let config = config(&dir, &format!("port = {}", broker.port), JSON, &names);

@@ -1,6 +1,7 @@
 //! Holding registers: the settings.
 
-use crate::link::settings::{Region, Settings, Wire};
+use crate::link::settings::{Region, Settings};
+use crate::wire::Format;
 
 use crate::wire::modbus::half;
 
@@ -35,14 +36,7 @@ impl Image {
             image.put(at + 1, half(value.to_bits(), 1));
         }
         image.put(4, u16::from(settings.max_peaks));
-        image.put(
-            5,
-            match settings.wire {
-                Wire::Text => 0,
-                Wire::Binary => 1,
-                Wire::Modbus => 2,
-            },
-        );
+        image.put(5, settings.wire.register());
         image.put(6, u16::from(settings.unit));
         if let Some(roi) = settings.roi {
             for (at, value) in (16..).zip([roi.x, roi.y, roi.width, roi.height]) {
@@ -72,12 +66,7 @@ impl Image {
             window_s: real(0)?,
             hop_s: real(2)?,
             max_peaks: u8::try_from(self.register(4)?).ok()?,
-            wire: match self.register(5)? {
-                0 => Wire::Text,
-                1 => Wire::Binary,
-                2 => Wire::Modbus,
-                _ => return None,
-            },
+            wire: Format::of_register(self.register(5)?)?,
             unit: u8::try_from(self.register(6)?).ok()?,
             false_alarm: real(8)?,
             um_per_px: optional(10)?,

@@ -4,7 +4,8 @@ use core::fmt;
 
 use crate::report::MAX_PEAKS;
 
-use super::{Region, Settings, Wire};
+use super::{Region, Settings};
+use crate::wire::Format;
 
 /// What the board's camera and memory allow.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -54,7 +55,7 @@ pub enum SettingsError {
         max_hz: f32,
     },
     /// This firmware was built without it.
-    Wire(Wire),
+    Wire(Format),
     /// Not from 1 to 247.
     Unit(u8),
     /// They are locked.
@@ -86,12 +87,11 @@ impl fmt::Display for SettingsError {
                 "min-hz is {}, max-hz is {}; keep min-hz below max-hz",
                 min_hz, max_hz
             ),
-            Self::Wire(Wire::Text | Wire::Binary) => {
-                f.write_str("wire is binary; this firmware was built without it")
-            }
-            Self::Wire(Wire::Modbus) => {
-                f.write_str("wire is modbus; this firmware was built without it")
-            }
+            Self::Wire(wire) => write!(
+                f,
+                "wire is {}; this firmware was built without it",
+                wire.name()
+            ),
             Self::Unit(unit) => write!(f, "unit is {unit}; give 1 to 247"),
             Self::Locked => f.write_str("settings are locked; unlock them first"),
         }

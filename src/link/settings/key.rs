@@ -3,7 +3,8 @@
 use core::fmt;
 
 use super::real;
-use super::{Region, Settings, Wire};
+use super::{Region, Settings};
+use crate::wire::Format;
 
 /// Name of a setting; the same names as the options of the command `rowtone`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -118,12 +119,7 @@ impl Key {
             Self::MinHz => settings.min_hz = optional(text)?,
             Self::MaxHz => settings.max_hz = optional(text)?,
             Self::Wire => {
-                settings.wire = match text {
-                    "text" => Wire::Text,
-                    "binary" => Wire::Binary,
-                    "modbus" => Wire::Modbus,
-                    _ => return Err(wrong),
-                }
+                settings.wire = Format::named(text).ok_or(wrong)?;
             }
             Self::Unit => settings.unit = byte(text)?,
         }
@@ -152,11 +148,7 @@ impl Key {
             },
             Self::MinHz => optional(out, settings.min_hz),
             Self::MaxHz => optional(out, settings.max_hz),
-            Self::Wire => out.write_str(match settings.wire {
-                Wire::Text => "text",
-                Wire::Binary => "binary",
-                Wire::Modbus => "modbus",
-            }),
+            Self::Wire => out.write_str(settings.wire.name()),
             Self::Unit => write!(out, "{}", settings.unit),
         }
     }

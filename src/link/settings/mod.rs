@@ -17,6 +17,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::math::ns_of_s;
 use crate::spectrum;
+use crate::wire::Format;
 
 pub use check::{Limits, SettingsError};
 pub use console::{Board, Console};
@@ -34,28 +35,6 @@ pub struct Region {
     pub width: u16,
     /// Rows.
     pub height: u16,
-}
-
-/// How reports are written, see [`crate::wire`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Wire {
-    /// [`crate::wire::text`]
-    Text,
-    /// [`crate::wire::binary`]
-    Binary,
-    /// [`crate::wire::modbus`]
-    Modbus,
-}
-
-impl Wire {
-    /// This build speaks it (features `binary` and `modbus`).
-    pub const fn is_built_in(self) -> bool {
-        match self {
-            Self::Text => true,
-            Self::Binary => cfg!(feature = "binary"),
-            Self::Modbus => cfg!(feature = "modbus"),
-        }
-    }
 }
 
 /// All that can be set.
@@ -78,7 +57,7 @@ pub struct Settings {
     /// Highest frequency to report, Hz; as high as the rows allow where there is none.
     pub max_hz: Option<f32>,
     /// How reports are written.
-    pub wire: Wire,
+    pub wire: Format,
     /// Address as a Modbus server, 1 to 247.
     pub unit: u8,
     /// The number that unlocks the settings, where they are locked ([`Console::lock`]).
@@ -96,7 +75,7 @@ impl Settings {
         roi: None,
         min_hz: None,
         max_hz: None,
-        wire: Wire::Text,
+        wire: Format::Text,
         unit: 1,
         lock: None,
     };

@@ -13,8 +13,9 @@ use heapless::String;
 use rowtone::link::Link;
 use rowtone::link::outbox::Outbox;
 use rowtone::link::settings::store::Started;
-use rowtone::link::settings::{Board, Console, Wire};
+use rowtone::link::settings::{Board, Console};
 use rowtone::report::Report;
+use rowtone::wire::Format;
 use rowtone_pico2::boot::{Boot, FirstReport};
 use rowtone_pico2::losses::Losses;
 use rowtone_pico2::plan::{DEFAULTS, LIMITS};
@@ -113,7 +114,7 @@ fn publish(link: &Link<'_>) {
 /// A line for people: `#` and a sentence. A receiver of the text wire waits for `$` and does not see it; the
 /// other wires have no place for it.
 async fn note(out: &mut BufferedUartTx, link: &Link<'_>, text: core::fmt::Arguments<'_>) {
-    if link.console().settings().wire != Wire::Text {
+    if link.console().settings().wire != Format::Text {
         return;
     }
     let mut line = String::<160>::new();

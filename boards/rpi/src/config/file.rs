@@ -4,8 +4,9 @@ use std::fmt::Display;
 use std::ops::RangeInclusive;
 use std::path::PathBuf;
 
-use rowtone::link::settings::{Region, Wire};
+use rowtone::link::settings::Region;
 use rowtone::report::MAX_PEAKS;
+use rowtone::wire::Format;
 use serde::Deserialize;
 use toml::Spanned;
 
@@ -242,11 +243,7 @@ impl Reader<'_> {
         }
         let baud = self.number("output.baud", &file.baud, 300..=4_000_000)?;
         config.output.baud = baud.unwrap_or(config.output.baud);
-        let wires = [
-            ("text", Wire::Text),
-            ("binary", Wire::Binary),
-            ("modbus", Wire::Modbus),
-        ];
+        let wires = Format::ALL.map(|wire| (wire.name(), wire));
         let wire = self.word("output.wire", &file.wire, &wires)?;
         config.settings.wire = wire.unwrap_or(config.settings.wire);
         let unit = self.number("output.unit", &file.unit, 1..=247)?;
