@@ -62,6 +62,16 @@ pub struct Feed {
     /// Columns and rows of a frame as it is stored.
     size: (usize, usize),
     stop: Option<Arc<AtomicBool>>,
+    onlooker: Option<Onlooker>,
+}
+
+/// Who is shown every frame.
+struct Onlooker(Box<dyn FnMut(&Frame) + Send>);
+
+impl std::fmt::Debug for Onlooker {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("Onlooker")
+    }
 }
 
 impl Feed {
@@ -143,12 +153,18 @@ impl Feed {
             delivered: 0,
             size,
             stop: None,
+            onlooker: None,
         })
     }
 
     /// Ends the recording at the next frame as soon as this says so, as if it were its last.
     pub fn stop_when(&mut self, stop: Arc<AtomicBool>) {
         self.stop = Some(stop);
+    }
+
+    /// Shows every frame to `onlooker` too, before it is measured, on the thread that measures.
+    pub fn show_to(&mut self, onlooker: impl FnMut(&Frame) + Send + 'static) {
+        self.onlooker = Some(Onlooker(Box::new(onlooker)));
     }
 
     /// The next frame; `None` after the last.
@@ -177,6 +193,9 @@ impl Feed {
                     && let Some(doubt) = self.camera.doubt.take()
                 {
                     return Err(doubt.into());
+                }
+                if let Some(Onlooker(see)) = &mut self.onlooker {
+                    see(&frame);
                 }
                 Ok(Some(frame))
             }

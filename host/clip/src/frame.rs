@@ -80,6 +80,12 @@ impl Frame {
         }
     }
 
+    /// The luma plane of the picture as it was given, before it is turned: a byte a pixel, or a little-endian word where
+    /// it has more than 8 bits; further bytes may follow.
+    pub fn given(&self) -> &[u8] {
+        self.raw.get(self.luma..).unwrap_or_default()
+    }
+
     /// Row `row` of a part of the (turned) picture. The part must lie inside it.
     pub fn pixels(&self, part: &Rect, row: usize) -> Pixels<'_> {
         cut(self.plane(), row_of(part, self.width, row))
