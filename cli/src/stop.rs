@@ -24,6 +24,17 @@ pub fn on_signals() -> Arc<AtomicBool> {
     stop
 }
 
+/// Has the same signals noted in `flag` too.
+pub fn also_in(flag: &Arc<AtomicBool>) {
+    #[cfg(unix)]
+    for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
+        // Where it cannot be had, whoever waits for this flag sees the other one.
+        let _ = signal_hook::flag::register(signal, Arc::clone(flag));
+    }
+    #[cfg(not(unix))]
+    let _ = flag;
+}
+
 /// A file that grows beyond what is allowed (`ulimit -f`) is an error of its writing, not the end of the
 /// program.
 pub fn outlive_large_files() {

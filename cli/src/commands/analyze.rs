@@ -4,17 +4,18 @@ use std::path::PathBuf;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use clap::ValueEnum;
-use rowtone::report::{MAX_PEAKS, PeakShape, Report, Warnings};
+use rowtone::report::{PeakShape, Report, Warnings};
 use rowtone::tracker::Axes;
 use rowtone::wire::{Message, text as wire_text};
 
+use super::window::WindowArgs;
 use crate::camera_args::CameraArgs;
 use crate::failure::Failure;
 use crate::output::Out;
 use crate::output::progress::Progress;
 use rowtone_clip::Feed;
 use rowtone_files::WholeFile;
-use rowtone_measure::analysis::{Analysis, Event, Plan, Settings};
+use rowtone_measure::analysis::{Analysis, Event, Plan};
 use rowtone_measure::tracking::Shifts;
 use rowtone_plot::Picture;
 use rowtone_report::json::{self, Place};
@@ -32,22 +33,8 @@ use rowtone_serial::sender::Sender;
 pub struct Args {
     #[command(flatten)]
     camera: CameraArgs,
-    /// Length of a window, s
-    #[arg(long, value_name = "S", default_value_t = 1.0, value_parser = seconds, allow_negative_numbers = true)]
-    window: f64,
-    /// From one window to the next, s [default: half a window]
-    #[arg(long, value_name = "S", value_parser = seconds, allow_negative_numbers = true)]
-    hop: Option<f64>,
-    /// Most peaks reported
-    #[arg(long, value_name = "N", default_value_t = 8,
-          value_parser = clap::value_parser!(u8).range(1..=MAX_PEAKS as i64))]
-    max_peaks: u8,
-    /// Lowest frequency looked for, Hz [default: one period a window]
-    #[arg(long, value_name = "F", value_parser = hertz, allow_negative_numbers = true)]
-    min_hz: Option<f64>,
-    /// Highest frequency looked for, Hz [default: 2000; half the frame rate with --global-shutter]
-    #[arg(long, value_name = "F", value_parser = hertz, allow_negative_numbers = true)]
-    max_hz: Option<f64>,
+    #[command(flatten)]
+    window: WindowArgs,
     /// Where the zones B, C and D of ISO 20816 begin for this machine, mm/s RMS: adds its zone
     #[arg(long, value_name = "B,C,D", requires = "um_per_px")]
     zone_limits: Option<ZoneLimits>,
@@ -70,33 +57,12 @@ enum Format {
     Wire,
 }
 
-fn seconds(text: &str) -> Result<f64, String> {
-    in_range(text, 0.001, 3600.0, "s")
-}
-
-fn hertz(text: &str) -> Result<f64, String> {
-    in_range(text, 1e-3, 1e6, "Hz")
-}
-
-fn in_range(text: &str, low: f64, high: f64, unit: &str) -> Result<f64, String> {
-    let number = text.parse().ok();
-    number
-        .filter(|x: &f64| (low..=high).contains(x))
-        .ok_or_else(|| format!("want a number from {low} to {high} {unit}"))
-}
-
 /// Measures the recording and says what vibrates.
 ///
 /// # Errors
 /// [`Failure`] as every command; reports of what was measured before come out all the same.
 pub fn run(args: &Args) -> Result<(), Failure> {
-    if let (Some(min), Some(max)) = (args.min_hz, args.max_hz)
-        && min >= max
-    {
-        return Err(Failure::usage(format!(
-            "--min-hz {min} must be below --max-hz {max}"
-        )));
-    }
+    args.window.check()?;
     // What cannot be written is said before anything is measured.
     if let Some(path) = &args.plot {
         rowtone_plot::check_ending(path)?;
@@ -107,28 +73,23 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let serial = args.serial.as_ref().map(|port| {
         // What comes through a pipe may be live, and does not wait.
         let may_wait = !options.is_pipe();
-        Sender::open(port, session, &as_a_board_says(args), may_wait)
+        Sender::open(
+            port,
+            session,
+            &args.window.as_a_board_says(args.camera.um_per_px),
+            may_wait,
+        )
     });
     let serial = serial.transpose()?;
     let mut feed = Feed::open(&options)?;
     feed.stop_when(crate::stop::on_signals());
-    let plan = Plan::new(
-        &feed.camera,
-        &Settings {
-            window_s: args.window,
-            hop_s: args.hop.unwrap_or(args.window / 2.0),
-            max_peaks: args.max_peaks.into(),
-            min_hz: args.min_hz,
-            max_hz: args.max_hz,
-            um_per_px: args.camera.um_per_px,
-        },
-    )?;
+    let plan = Plan::new(&feed.camera, &args.window.settings(args.camera.um_per_px))?;
     let shifts = Shifts::start(feed, Some(plan.groups()))?;
     let picture = args.plot.clone().map(|path| {
         Picture::new(rowtone_plot::Settings {
             path,
             title: title(&shifts),
-            band_hz: (args.min_hz.unwrap_or(0.0), plan.max_hz()),
+            band_hz: (args.window.min_hz.unwrap_or(0.0), plan.max_hz()),
             exposure_s: f64::from(shifts.camera.timing.exposure_ns()) * 1e-9,
             one_a_frame: args.camera.global_shutter,
         })
@@ -139,10 +100,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let mut outlets = Outlets {
         place: Place {
             roi: [given.x, given.y, given.width, given.height],
-            axes: match shifts.axes {
-                Axes::X => "x",
-                Axes::Xy => "xy",
-            },
+            axes: axes_name(shifts.axes),
         },
         format: args.format,
         name: shifts.name.clone(),
@@ -173,16 +131,11 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The options that are a board's settings too.
-fn as_a_board_says(args: &Args) -> rowtone::link::settings::Settings {
-    rowtone::link::settings::Settings {
-        window_s: args.window as f32,
-        hop_s: args.hop.unwrap_or(args.window / 2.0) as f32,
-        max_peaks: args.max_peaks,
-        um_per_px: args.camera.um_per_px.map(|scale| scale as f32),
-        min_hz: args.min_hz.map(|hz| hz as f32),
-        max_hz: args.max_hz.map(|hz| hz as f32),
-        ..rowtone::link::settings::Settings::default()
+/// What the reports call the axes.
+pub(super) fn axes_name(axes: Axes) -> &'static str {
+    match axes {
+        Axes::X => "x",
+        Axes::Xy => "xy",
     }
 }
 

@@ -25,10 +25,12 @@ pub mod gateway;
 #[cfg(any(test, not(all(feature = "gateway", feature = "lab"))))]
 mod missing;
 pub mod monitor;
+pub mod serve;
 pub mod simulate;
 #[cfg(feature = "lab")]
 pub mod sweep;
 pub mod verify;
+pub mod window;
 
 /// Measures vibration with a rolling-shutter camera: every row of a frame is a sample in time.
 #[derive(Debug, Parser)]
@@ -54,6 +56,8 @@ enum Command {
     Displacement(displacement::Args),
     /// Decodes what a board sends over a serial port
     Monitor(monitor::Args),
+    /// Shows a recording, a live pipe or a board in the browser
+    Serve(serve::Args),
     /// Sends the reports of many boards to an MQTT broker
     #[cfg(feature = "gateway")]
     Gateway(gateway::Args),
@@ -92,6 +96,7 @@ fn run(command: &Command) -> Result<(), Failure> {
         Command::Analyze(args) => analyze::run(args),
         Command::Displacement(args) => displacement::run(args),
         Command::Monitor(args) => monitor::run(args),
+        Command::Serve(args) => serve::run(args),
         #[cfg(feature = "gateway")]
         Command::Gateway(args) => gateway::run(args),
         #[cfg(not(feature = "gateway"))]
