@@ -33,6 +33,10 @@ const KEEP: f32 = 0.75;
 const MOST_INFORMATION: f32 = 1e3;
 /// Beyond this the rows' expansions say nothing, px.
 const MOST_PX: f32 = 1.0;
+/// A row that reads a place further than this, and so many standard deviations, from the row of the reference that it is read
+/// against says nothing: it shows something else, and expansions make of that whatever they like.
+const NONSENSE_PX: f32 = 2.0 * MOST_PX;
+const NONSENSE_SD: f32 = 6.0;
 /// A line further from its row of the reference than this, in steps from one row of its colour to the next, is read against
 /// the next one.
 const NEAR_STEPS: f32 = 0.6;
@@ -301,7 +305,10 @@ impl Tracker<'_> {
         let there = planar.approach(near, second, vertical_table);
         let upright = near + self.correlator.lean_px - there.lean_px;
         let (first, vertical) = planar.settle(upright, there.px, second, vertical_table);
-        if !(first + vertical.shift_px).is_finite() {
+        let beyond_px = vertical.shift_px.abs() - NONSENSE_PX;
+        let nonsense = beyond_px > 0.0
+            && beyond_px * beyond_px * vertical.information_per_px2 > NONSENSE_SD * NONSENSE_SD;
+        if nonsense || !(first + vertical.shift_px).is_finite() {
             return Err(Rejected::NoTexture);
         }
         planar.accept(there);
@@ -420,8 +427,8 @@ impl Tracker<'_> {
         }
         let (shift_px, vertical) = planar.settle(upright_px, near.px, second, vertical_table);
         let information_per_px2 = table.information_per_px2();
-        // Not true of what is no number.
-        let known = vertical.shift_px.abs() < f32::MAX;
+        // Not true of what is no number either; what is further away is looked at closely.
+        let known = vertical.shift_px.abs() < NONSENSE_PX;
         if !known {
             return None;
         }
