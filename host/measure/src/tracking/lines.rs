@@ -8,6 +8,7 @@ use rowtone::timeline::{Displacement, Group};
 
 use super::codec;
 use super::region::{self, Choice, Region};
+use super::vet::Vet;
 use super::{Chosen, Ending, Engine, FrameShifts, Wanted, background};
 use crate::MeasureError;
 use rowtone_clip::ring::Outlet;
@@ -16,6 +17,10 @@ use rowtone_memory::TrackerMemory;
 
 /// Frames that the reference is learned from.
 const LEARN_FRAMES: usize = 30;
+/// Which part vibrates is chosen by so much of a file, s, and by at most so many frames: thirty frames of a high-speed camera
+/// may be less than a period.
+const CHOOSE_S: f64 = 0.5;
+const CHOOSE_FRAMES: usize = 256;
 /// Frames of the first round.
 const ROUGH_FRAMES: usize = 10;
 /// Fewer where they are so large that keeping them would take more than this, bytes of luma.
@@ -57,6 +62,8 @@ fn measure_all(
         &mut memory,
         still_memory.as_mut(),
     )?;
+    // A reference is learned from frames that follow each other.
+    let first = &kept[..kept.len().min(LEARN_FRAMES)];
     let choice = lines.learn_roughly_and_choose(&feed.camera, &kept, &part);
     let region = choice.region;
     lines.chosen = Some(Chosen {
@@ -76,9 +83,9 @@ fn measure_all(
             still_memory.as_mut(),
         )?;
         lines.chosen = chosen;
-        lines.learn_roughly(&kept);
+        lines.learn_roughly(first);
     }
-    lines.learn(&kept, 1);
+    lines.learn(first, 1);
     if let Some(cut) = kept.iter().find(|frame| frame.is_cut()) {
         return Err(feed.cut_short(cut).into());
     }
@@ -89,9 +96,12 @@ fn measure_all(
         width: region.columns.len(),
         height: region.rows.len(),
     };
-    lines
-        .found
-        .insert_if(codec::is_between(&kept, &seen), Warning::Compressed);
+    if codec::is_between(first, &seen) {
+        lines.found.insert(Warning::Compressed);
+        // With a rolling shutter each row is of another time.
+        let at_once = feed.camera.timing.is_global_shutter();
+        lines.vet = at_once.then(|| Vet::new(part.height));
+    }
     lines.run(feed, kept, more, notes, to)
 }
 
@@ -117,10 +127,15 @@ fn told(region: &Region, camera: &Camera) -> String {
     )
 }
 
-/// The frames to learn from, and whether more follow.
+/// The frames to choose the part by and to learn from, and whether more follow.
 fn keep_first(feed: &mut Feed) -> (Vec<Frame>, Result<bool, ClipError>) {
     let (width, height) = feed.camera.size;
-    let most = (LEARN_BYTES / (width * height)).clamp(2, LEARN_FRAMES);
+    let chooses = feed.camera.part.is_none() && feed.frames.is_some();
+    let wanted = match chooses {
+        true => ((CHOOSE_S * feed.camera.fps) as usize).clamp(LEARN_FRAMES, CHOOSE_FRAMES),
+        false => LEARN_FRAMES,
+    };
+    let most = (LEARN_BYTES / (width * height)).clamp(2, wanted);
     let mut kept = Vec::new();
     while kept.len() < most {
         match feed.next_frame() {
@@ -138,6 +153,8 @@ struct Lines<'a> {
     still: Option<Engine<'a>>,
     /// The background's rows of this frame.
     still_rows: Vec<Displacement>,
+    /// Where a codec has been at the rows.
+    vet: Option<Vet>,
     /// Rows are combined to readings.
     combines: bool,
     /// That stripes were mistaken was told.
@@ -186,6 +203,7 @@ impl<'a> Lines<'a> {
             moving,
             still,
             still_rows: Vec::new(),
+            vet: None,
             combines: groups.is_some(),
             slips_told: false,
             chosen: None,
@@ -196,8 +214,9 @@ impl<'a> Lines<'a> {
     /// The first round of learning, and which part of `part` vibrates, where that is asked for: chosen on another thread
     /// while this one learns all of it, for mostly that is what is chosen.
     fn learn_roughly_and_choose(&mut self, camera: &Camera, kept: &[Frame], part: &Rect) -> Choice {
+        let first = &kept[..kept.len().min(LEARN_FRAMES)];
         if camera.part.is_some() {
-            self.learn_roughly(kept);
+            self.learn_roughly(first);
             return Choice {
                 region: Region::whole(part),
                 camera_moves: false,
@@ -205,7 +224,7 @@ impl<'a> Lines<'a> {
         }
         thread::scope(|scope| {
             let choice = scope.spawn(|| region::choose(kept, part, &camera.timing));
-            self.learn_roughly(kept);
+            self.learn_roughly(first);
             choice.join().unwrap_or_else(|panic| resume_unwind(panic))
         })
     }
@@ -278,12 +297,15 @@ impl<'a> Lines<'a> {
         shifts.readings.clear();
         let (rows, readings) = (&mut shifts.rows, &mut shifts.readings);
         match &mut self.still {
-            None if self.combines => {
+            None if self.combines && self.vet.is_none() => {
                 self.moving
                     .measure_into(&frame, |reading| readings.push(reading));
             }
             still => {
                 self.moving.measure(&frame, |row| rows.push(row));
+                if let Some(vet) = &mut self.vet {
+                    vet.weigh(rows);
+                }
                 if let Some(still) = still {
                     self.still_rows.clear();
                     still.measure(&frame, |row| self.still_rows.push(row));

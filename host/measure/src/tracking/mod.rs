@@ -12,6 +12,7 @@ mod codec;
 mod engine;
 mod lines;
 pub mod region;
+mod vet;
 
 use rowtone::pipeline::Reading;
 use rowtone::report::Warnings;

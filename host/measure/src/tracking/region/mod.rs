@@ -18,11 +18,14 @@ use rowtone::camera::{Pixels, Timing};
 
 use rowtone_clip::{Frame, Rect};
 use shifts::Shifts;
+use tones::Tone;
 
 /// Fewer frames tell nothing.
 const LEAST_FRAMES: usize = 12;
 /// So many tones at most decide.
 const TONES: usize = 4;
+/// What has fewer periods in the time that is looked at is wandering, where anything has more.
+const PERIODS: f64 = 6.0;
 /// Tiles across lines.
 const BANDS: usize = 10;
 
@@ -106,6 +109,12 @@ pub fn choose<P: Picture>(frames: &[P], part: &Rect, timing: &Timing) -> Choice 
         all.push(tones::take_out(&mut shifts, tone.hz, &bands));
     }
     let camera_moves = is_regular(&shifts.starts_s) && rectangle::camera_moves(&all, across, down);
+    let vibrates = |tone: &Tone| tone.hz * shifts.span_s() >= PERIODS;
+    let decisive = &known[..tones.len()];
+    if decisive.iter().any(vibrates) {
+        let mut decisive = decisive.iter();
+        tones.retain(|_| decisive.next().is_some_and(vibrates));
+    }
     let Some(found) = rectangle::best_of_motions(tones, across, down) else {
         return Choice {
             camera_moves,
@@ -115,6 +124,8 @@ pub fn choose<P: Picture>(frames: &[P], part: &Rect, timing: &Timing) -> Choice 
     let span = |pieces: &[Range<usize>], found: &Range<usize>| {
         pieces[found.start].start..pieces[found.end - 1].end
     };
+    let textured = |x: usize, y: usize| bands[y].clone().any(|group| shifts.grips[x][group] > 0.0);
+    let found = found.without_blank_sides(textured);
     let columns = span(&shifts.columns, &found.columns);
     let rows = span(&shifts.groups, &span(&bands, &found.rows));
     Choice {
@@ -139,4 +150,70 @@ fn cut(length: usize, least: usize, most: usize) -> Vec<Range<usize>> {
     (0..n)
         .map(|k| k * length / n..(k + 1) * length / n)
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SIZE: (usize, usize) = (320, 160);
+
+    /// A frame of a high-speed camera.
+    struct Still(i64, Vec<u8>);
+
+    impl Picture for Still {
+        fn start_ns(&self) -> i64 {
+            self.0
+        }
+
+        fn row(&self, part: &Rect, row: usize) -> Pixels<'_> {
+            Pixels::U8(&self.1[(part.y + row) * SIZE.0 + part.x..][..part.width])
+        }
+    }
+
+    /// A tuning fork before a blank wall at 1000 fps, 256 frames: two bright prongs, below row 64, that move against each
+    /// other by 1.5 px at 31.97 Hz. Both wander together by 0.5 px at 5 Hz.
+    fn fork() -> Vec<Still> {
+        let mut state = 9_u64;
+        let mut noise = || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
+            (state >> 40) as f64 / (1 << 24) as f64 - 0.5
+        };
+        let frame = |k: i64| {
+            let t = k as f64 * 1e-3;
+            let swing = 1.5 * (std::f64::consts::TAU * 31.97 * t).sin();
+            let wander = 0.5 * (std::f64::consts::TAU * 5.0 * t).sin();
+            let prong = |x: f64, middle: f64| 100.0 / (1.0 + ((x - middle).abs() - 6.0).exp());
+            let mut pixels = Vec::with_capacity(SIZE.0 * SIZE.1);
+            for y in 0..SIZE.1 {
+                for x in 0..SIZE.0 {
+                    let x = x as f64 - wander;
+                    let light = match y < 64 {
+                        true => 0.0,
+                        false => prong(x, 138.0 - swing) + prong(x, 182.0 + swing),
+                    };
+                    pixels.push((60.0 + light + 3.0 * noise()) as u8);
+                }
+            }
+            Still(k * 1_000_000, pixels)
+        };
+        (0..256).map(frame).collect()
+    }
+
+    #[test]
+    fn of_a_fork_before_a_blank_wall_one_prong_is_chosen() {
+        let part = Rect::whole(SIZE.0, SIZE.1);
+        let timing = Timing::new(0, 0, SIZE.1 as u16).unwrap();
+        let Region { columns, rows } = choose(&fork(), &part, &timing).region;
+        let has =
+            |middle: usize| columns.contains(&(middle - 9)) && columns.contains(&(middle + 9));
+        assert!(has(138) != has(182), "{columns:?} {rows:?}");
+        assert!(columns.len() < 90, "{columns:?}");
+        assert!(
+            rows.start > 0 && rows.start < 65 && rows.end == SIZE.1,
+            "{rows:?}"
+        );
+    }
 }

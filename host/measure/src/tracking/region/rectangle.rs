@@ -166,6 +166,27 @@ pub(super) struct Rectangle {
     pub(super) rows: Range<usize>,
 }
 
+impl Rectangle {
+    /// The same without the columns and rows at its sides that are blank, up to one beside those that are not: they know
+    /// nothing, and what a codec does there is no motion.
+    pub(super) fn without_blank_sides(self, textured: impl Fn(usize, usize) -> bool) -> Self {
+        let Self { columns, rows } = self;
+        let column = |x: usize| rows.clone().any(|y| textured(x, y));
+        let row = |y: usize| columns.clone().any(|x| textured(x, y));
+        Self {
+            columns: kept(&columns, column),
+            rows: kept(&rows, row),
+        }
+    }
+}
+
+/// From one before the first that has something to one behind the last; all where none has.
+fn kept(all: &Range<usize>, has: impl Fn(usize) -> bool) -> Range<usize> {
+    let first = all.clone().find(|&k| has(k)).unwrap_or(all.start);
+    let last = all.clone().rev().find(|&k| has(k)).unwrap_or(all.end);
+    first.saturating_sub(1).max(all.start)..(last + 2).min(all.end)
+}
+
 /// Sums over rectangles of tiles of one tone.
 struct Table {
     columns: usize,

@@ -19,6 +19,8 @@ const ALIKE: f64 = 0.1;
 const GHOST: f64 = 1.5;
 /// A group whose texture is no more than so many times what its mean's noise makes has none.
 const TEXTURE: f64 = 4.0;
+/// The noise of the pixels of one strip is at most so many times the usual one's.
+const MOTLEY: f64 = 4.0;
 
 /// Takes each group's mean and trend over the frames off, measures the noise of each strip, and lets go of groups that
 /// have no texture.
@@ -38,9 +40,13 @@ pub(super) fn measure_noise(shifts: &mut Shifts) {
             let median = f64::from(median);
             shifts.noise[strip] = median / std::f64::consts::LN_2 / grip;
         }
-        let noise = shifts.noise[strip];
+    }
+    let usual = usual_noise(&shifts.noise);
+    for (strip, columns) in shifts.columns.iter().enumerate() {
+        // What moves irregularly, or by more than a shift is linear in, has more than the pixels' noise.
+        let noise = shifts.noise[strip].min(MOTLEY * usual);
         for (k, rows) in shifts.groups.iter().enumerate() {
-            let pixels = (rows.len() * shifts.columns[strip].len()) as f64;
+            let pixels = (rows.len() * columns.len()) as f64;
             let chance = (noise * pixels / (2.0 * frames as f64)) as f32;
             let grip = &mut shifts.grips[strip][k];
             if *grip > (1.0 + TEXTURE as f32) * chance {
@@ -51,6 +57,16 @@ pub(super) fn measure_noise(shifts: &mut Shifts) {
             }
         }
     }
+}
+
+/// The median of the strips that have any.
+fn usual_noise(noise: &[f64]) -> f64 {
+    let mut some: Vec<f64> = noise.iter().copied().filter(|&n| n > 0.0).collect();
+    let middle = some.len() / 2;
+    if some.is_empty() {
+        return 0.0;
+    }
+    *some.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 /// A tone that was found.
