@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 
 use crate::failure::Failure;
 use rowtone::report::Report;
+use rowtone::tracker::Axes;
 use rowtone_clip::{CameraOptions, Feed};
 use rowtone_measure::analysis::{Analysis, Event, Plan, Settings};
 use rowtone_measure::tracking::Shifts;
@@ -28,7 +29,8 @@ use crate::output::Out;
     \"full\") and the amplitudes may be left out; tolerances of amplitudes and\n\
     nothing_else_above are shares (of the amplitude; of the largest tone).\n\n\
     A recording is right if every window has every tone, and nothing else above\n\
-    that share that is not marked as ambiguous. Exit status 1 if any is not.\n\n\
+    that share that is not marked as ambiguous. Of a tone that dies away evenly,\n\
+    amplitude_px is that of the first window. Exit status 1 if any is not right.\n\n\
     Example:\n  rowtone verify recordings"
 )]
 pub struct Args {
@@ -113,6 +115,7 @@ fn measure(folder: &Path, truth: &Truth) -> Result<Vec<Report>, Failure> {
         global_shutter: truth.global_shutter,
         exposure_us: truth.exposure_us,
         roi: truth.roi()?,
+        axes: Axes::Xy,
         ..CameraOptions::of(&clip.display().to_string())
     };
     let feed = Feed::open(&options)?;

@@ -20,6 +20,51 @@ pub(super) struct Score {
     /// Peaks that are nothing true and not marked as ambiguous, in all windows, and the largest, Hz and px.
     false_peaks: usize,
     largest_false: Option<(f32, f32)>,
+    /// What the tones' amplitudes were, until they are judged.
+    sizes: Vec<Size>,
+}
+
+/// A tone's amplitude in one window.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Size {
+    /// Which of the tones.
+    tone: usize,
+    t_s: f64,
+    px: f64,
+}
+
+/// An amplitude that dies away.
+struct Decay {
+    /// Logarithm of the amplitude at t = 0, and how fast it falls, 1/s.
+    log: f64,
+    rate: f64,
+}
+
+impl Decay {
+    /// Through amplitudes at times, s, by least squares of their logarithms; `None` where there are too few, or they do not
+    /// fall.
+    fn through(seen: &[(f64, f64)]) -> Option<Self> {
+        if seen.len() < 3 || seen.iter().any(|(_, px)| *px <= 0.0) {
+            return None;
+        }
+        let n = seen.len() as f64;
+        let middle = seen.iter().map(|(t, _)| t).sum::<f64>() / n;
+        let mean = seen.iter().map(|(_, px)| px.ln()).sum::<f64>() / n;
+        let (mut product, mut square) = (0.0, 0.0);
+        for (t, px) in seen {
+            product += (t - middle) * (px.ln() - mean);
+            square += (t - middle) * (t - middle);
+        }
+        let rate = -product / square;
+        (rate > 0.0 && rate.is_finite()).then_some(Self {
+            log: mean + rate * middle,
+            rate,
+        })
+    }
+
+    fn px_at(&self, t_s: f64) -> f64 {
+        (self.log - self.rate * t_s).exp()
+    }
 }
 
 /// The table's first line.
@@ -50,13 +95,40 @@ impl Score {
         {
             score.add(report, truth);
         }
+        score.judge_amplitudes(truth);
         score
+    }
+
+    /// An amplitude is right where every window has it. What was struck dies away: then the first window has it, and the
+    /// others keep to one exponential through all of them.
+    fn judge_amplitudes(&mut self, truth: &Truth) {
+        let sizes = std::mem::take(&mut self.sizes);
+        for (k, tone) in truth.tones.iter().enumerate() {
+            let Some(px) = tone.amplitude_px else {
+                continue;
+            };
+            let of_tone = sizes.iter().filter(|size| size.tone == k);
+            let seen: Vec<(f64, f64)> = of_tone.map(|size| (size.t_s, size.px)).collect();
+            let decay = Decay::through(&seen);
+            let away = |(t_s, found): &(f64, f64)| match &decay {
+                Some(decay) => {
+                    let first = decay.px_at(seen[0].0) / px - 1.0;
+                    let along = found / decay.px_at(*t_s) - 1.0;
+                    first.abs().max(along.abs())
+                }
+                None => (found / px - 1.0).abs(),
+            };
+            for off in seen.iter().map(away) {
+                self.worst_amplitude = Some(self.worst_amplitude.unwrap_or(0.0).max(off));
+                self.found -= usize::from(off > tone.amplitude_tolerance);
+            }
+        }
     }
 
     fn add(&mut self, report: &Report, truth: &Truth) {
         self.windows += 1;
         let mut left: Vec<&Peak> = report.peaks.iter().collect();
-        for tone in &truth.tones {
+        for (k, tone) in truth.tones.iter().enumerate() {
             self.tones += 1;
             let Some(place) = nearest(&left, tone) else {
                 continue;
@@ -64,13 +136,12 @@ impl Score {
             let peak = left.remove(place);
             let off_hz = (f64::from(peak.hz) - tone.hz).abs() / tone.hz_tolerance;
             self.worst_hz = self.worst_hz.max(off_hz);
-            let mut right = true;
-            if let Some(px) = tone.amplitude_px {
-                let off = (f64::from(peak.amplitude_px) / px - 1.0).abs();
-                self.worst_amplitude = Some(self.worst_amplitude.unwrap_or(0.0).max(off));
-                right = off <= tone.amplitude_tolerance;
-            }
-            self.found += usize::from(right);
+            self.sizes.push(Size {
+                tone: k,
+                t_s: report.time_ms as f64 * 1e-3,
+                px: peak.amplitude_px.into(),
+            });
+            self.found += 1;
         }
         let largest = report
             .peaks
@@ -182,6 +253,25 @@ mod tests {
                 && (score.worst_amplitude.unwrap() - 0.02).abs() < 1e-3
         );
         assert!(score.line("a").ends_with("right"));
+    }
+
+    #[test]
+    fn what_was_struck_dies_away_evenly_from_its_amplitude_on() {
+        let windows = |amplitudes: [f32; 4]| {
+            let report = |(k, px): (usize, f32)| Report {
+                time_ms: 1000 + 500 * k as u64,
+                ..report(1.0, &[(32.0, px, false)])
+            };
+            let reports: Vec<Report> = amplitudes.into_iter().enumerate().map(report).collect();
+            Score::of(&reports, &truth())
+        };
+        let dies = windows([1.02, 0.9, 0.81, 0.73]);
+        assert!(dies.is_right(), "{dies:?}");
+        let too_small = windows([0.7, 0.63, 0.57, 0.51]);
+        assert_eq!((too_small.tones, too_small.found), (4, 0));
+        // A window of it is wrong, and so is one that rises.
+        assert!(!windows([1.0, 0.9, 0.5, 0.73]).is_right());
+        assert_eq!(windows([1.0, 1.1, 1.2, 1.3]).found, 1);
     }
 
     #[test]
