@@ -25,9 +25,11 @@ host() {
     if command -v systemd-analyze >/dev/null; then
         folder=$(mktemp -d)
         # The program need not be installed for that.
-        sed 's|/usr/bin/rowtone-rpi|/bin/true|' boards/rpi/debian/rowtone-rpi.service >"$folder/rowtone-rpi.service"
-        systemd-analyze verify --man=no "$folder/rowtone-rpi.service"
-        systemd-analyze security --offline=yes --threshold=15 "$folder/rowtone-rpi.service" | tail -1
+        for unit in rowtone-rpi.service rowtone-rpi@.service; do
+            sed 's|/usr/bin/rowtone-rpi|/bin/true|' "boards/rpi/debian/$unit" >"$folder/$unit"
+            systemd-analyze verify --man=no "$folder/${unit/@/@cam1}"
+            systemd-analyze security --offline=yes --threshold=16 "$folder/$unit" | tail -1
+        done
         rm -r "$folder"
     fi
 }

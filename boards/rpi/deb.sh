@@ -33,11 +33,14 @@ put 755 "$program" usr/bin/rowtone-rpi
 aarch64-linux-gnu-strip "$stage/usr/bin/rowtone-rpi"
 put 644 boards/rpi/debian/rowtone-rpi.toml etc/rowtone/rowtone-rpi.toml
 put 644 boards/rpi/debian/rowtone-rpi.service usr/lib/systemd/system/rowtone-rpi.service
+put 644 boards/rpi/debian/rowtone-rpi@.service usr/lib/systemd/system/rowtone-rpi@.service
+put 644 boards/rpi/debian/rowtone.avahi etc/avahi/services/rowtone.service
+put 644 docs/page.md usr/share/doc/rowtone-rpi/page.md
 put 644 boards/rpi/README.md usr/share/doc/rowtone-rpi/README.md
 put 644 boards/rpi/debian/copyright usr/share/doc/rowtone-rpi/copyright
 put 755 boards/rpi/debian/postinst DEBIAN/postinst
 put 755 boards/rpi/debian/prerm DEBIAN/prerm
-echo /etc/rowtone/rowtone-rpi.toml >"$stage/DEBIAN/conffiles"
+printf '%s\n' /etc/rowtone/rowtone-rpi.toml /etc/avahi/services/rowtone.service >"$stage/DEBIAN/conffiles"
 cat >"$stage/DEBIAN/control" <<CONTROL
 Package: rowtone-rpi
 Version: $version
@@ -47,10 +50,11 @@ Section: science
 Priority: optional
 Installed-Size: $(du -sk --apparent-size "$stage" | cut -f1)
 Depends: libc6 (>= $(needs GLIBC)), libgcc-s1, libstdc++6, libcamera0.7, libcamera-ipa
+Recommends: avahi-daemon
 Description: vibration from a Raspberry Pi camera, reported over UART
  Reads the rows of a rolling-shutter camera as samples in time, measures how the
- picture moves, and sends the vibration's frequencies and amplitudes over a
- serial line.
+ picture moves, sends the vibration's frequencies and amplitudes over a serial
+ line, and shows them on a page at http://NAME.local:7357.
 CONTROL
 mkdir -p "$out"
 package=$out/rowtone-rpi_${version}_arm64.deb

@@ -15,9 +15,9 @@ use crate::report::Report;
 use crate::wire::modbus::{FrameReader, State};
 use crate::wire::{Format, Message, binary, text};
 use outbox::Outbox;
-use settings::Console;
 use settings::command::LineReader;
-use settings::store::Keep;
+use settings::store::{Keep, SaveError};
+use settings::{Console, Settings, SettingsError};
 
 /// Most answers that can wait for the line. A command that comes while so many wait is refused.
 pub const MAX_ANSWERS: usize = 2;
@@ -85,6 +85,22 @@ impl<'a> Link<'a> {
     /// The settings in use, and what else the line can change.
     pub fn console(&self) -> &Console {
         &self.console
+    }
+
+    /// Changes all settings at once from another side than the line: the device's own page.
+    ///
+    /// # Errors
+    /// As [`Console::replace`].
+    pub fn change(&mut self, settings: Settings) -> Result<(), SettingsError> {
+        self.console.replace(settings)
+    }
+
+    /// Keeps the settings in use, as `save` over the line does.
+    ///
+    /// # Errors
+    /// As the store's.
+    pub fn save(&mut self, store: &mut impl Keep) -> Result<(), SaveError> {
+        self.console.save(store)
     }
 
     /// As [`Console::set_picture`].

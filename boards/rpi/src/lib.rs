@@ -12,6 +12,7 @@
 //! - [`capture`]: frames, lent where the camera wrote them; [`clock`]: which count, and when they began;
 //! - [`lines`]: the line path; [`session`]: it and the spectrum, from opening a camera to its end;
 //! - [`uart`]: the output thread; [`store`]: settings kept in a file;
+//! - [`page`]: what the page shows, and settings changed on it;
 //! - [`run`]: the service round all that; [`doctor`]: looks at every part and says what to do;
 //! - [`journal`], [`notify`], [`system`], [`backoff`], [`memory`]: small helpers.
 //!
@@ -28,6 +29,7 @@ pub mod lines;
 pub mod memory;
 pub mod mode;
 pub mod notify;
+pub mod page;
 pub mod run;
 pub mod sensor;
 pub mod session;

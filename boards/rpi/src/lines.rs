@@ -6,6 +6,9 @@ use rowtone::camera::{Line, Pixels, RawError, RawFormat};
 use rowtone::pipeline::{Collector, Light, LineSide};
 use rowtone::spectrum::{self, SampleBuffer};
 use rowtone::tracker::{self, Counts, Storage, Tracker};
+use rowtone_page::frames::Layout;
+use rowtone_page::live::Live;
+use rowtone_page::motion::MotionWriter;
 
 use crate::capture::Frame;
 use crate::clock::{Due, FrameClock};
@@ -21,6 +24,9 @@ pub struct Lines<'a> {
     room: Room,
     /// Bytes of a whole frame.
     frame_bytes: usize,
+    /// Displacements on their way to the page, and whether somebody looks at it.
+    motion: MotionWriter,
+    shown: bool,
 }
 
 /// Where rows of more than 8 bits are unpacked to, or the upper bytes of right-aligned words.
@@ -76,6 +82,8 @@ impl<'a> Lines<'a> {
                 upper: vec![0; setup.part.width.into()],
             },
             frame_bytes: last_row * shape.stride + line_end,
+            motion: MotionWriter::default(),
+            shown: false,
             setup,
         })
     }
@@ -147,10 +155,34 @@ impl<'a> Lines<'a> {
             let Some(reading) = self.lines.push(&line) else {
                 continue;
             };
+            if let (true, Some(sample)) = (self.shown, &reading.sample) {
+                self.motion.sample(sample);
+            }
             if self.collector.push(reading) {
                 complete(&mut self.collector);
             }
         }
+    }
+
+    /// Shows a frame that was taken, and how it moved, to whoever looks at the page. Nothing is waited for: while nobody
+    /// looks it costs a look at a clock.
+    pub fn show(&mut self, frame: &Frame<'_>, live: &Live) {
+        let shape = &self.setup.shape;
+        self.shown = live.frames.is_wanted();
+        if !self.shown || !frame.intact {
+            return;
+        }
+        self.motion.hand_over(&live.motion);
+        let layout = Layout {
+            width: shape.width,
+            height: shape.height,
+            stride: shape.stride,
+            format: shape.format,
+            bayer: shape.bayer,
+        };
+        let start_ns = frame.start_ns.unwrap_or_default();
+        live.frames
+            .keep(frame.sequence, start_ns, layout, frame.bytes);
     }
 
     /// The end: what is left becomes the last window, if it is long enough.

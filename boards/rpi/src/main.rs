@@ -1,5 +1,6 @@
 //! The command `rowtone-rpi`; see the library for how it works.
 
+use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -7,13 +8,17 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use clap::{Parser, Subcommand};
+use rowtone_page::live::Live;
+use rowtone_page::password::Hash;
 use rowtone_rpi::capture::simulated::{Scene, Simulated};
 use rowtone_rpi::capture::{CameraError, Source};
 use rowtone_rpi::config::Wish;
 use rowtone_rpi::config::{Config, ConfigError, Replay, StreamWish};
 use rowtone_rpi::doctor;
+use rowtone_rpi::page;
 use rowtone_rpi::run::{self, log};
 use rowtone_rpi::session::Shared;
+use rowtone_rpi::uart::TEXT;
 
 /// Where the configuration is unless told otherwise; it may be missing.
 const USUAL_CONFIG: &str = "/etc/rowtone/rowtone-rpi.toml";
@@ -29,7 +34,7 @@ struct Cli {
     /// Configuration file [default: /etc/rowtone/rowtone-rpi.toml, where there is one]
     #[arg(long, value_name = "FILE", global = true)]
     config: Option<PathBuf>,
-    /// Serial device, or - for standard output
+    /// Serial device, - for standard output, or text for people [default on a terminal: text]
     #[arg(long, value_name = "PORT", global = true)]
     output: Option<String>,
     /// Part of the camera's name
@@ -65,6 +70,8 @@ enum Command {
     Doctor,
     /// Lists cameras and their modes, and which one would be chosen
     Cameras,
+    /// Reads a password from standard input and prints what page.password is to be
+    Password,
 }
 
 fn main() -> ExitCode {
@@ -85,6 +92,7 @@ fn main() -> ExitCode {
             ExitCode::from(u8::from(found.bad))
         }
         Command::Cameras => list(&config),
+        Command::Password => hash_password(),
     }
 }
 
@@ -100,6 +108,13 @@ fn configure(cli: &Cli) -> Result<Config, String> {
     };
     if let Some(port) = &cli.output {
         config.output.port.clone_from(port);
+    } else if cli.config.is_none() && std::io::stdout().is_terminal() {
+        // Started by hand to see something.
+        config.output.port = TEXT.to_owned();
+    }
+    if cli.simulate && cli.config.is_none() {
+        // The service's own settings are not the simulation's.
+        config.service.state = PathBuf::new();
     }
     if cli.camera.is_some() {
         config.camera.id.clone_from(&cli.camera);
@@ -131,7 +146,30 @@ fn configure(cli: &Cli) -> Result<Config, String> {
 }
 
 fn measure(cli: &Cli, config: &Config) -> ExitCode {
+    let live = config
+        .page
+        .listen
+        .map(|_| Arc::new(Live::new(config.page.clip_bytes)));
     let shared = Shared::new(config.settings);
+    let shared = Arc::new(match &live {
+        Some(live) => shared.with_page(Arc::clone(live)),
+        None => shared,
+    });
+    // Measuring goes on without it.
+    let server = page::serve(config, &shared).unwrap_or_else(|e| {
+        let address = config
+            .page
+            .listen
+            .map_or(String::new(), |listen| listen.to_string());
+        log(&format!("the page at {address} cannot be served: {e}"));
+        None
+    });
+    if let Some(server) = &server {
+        log(&format!(
+            "the page is at http://{}/",
+            page::name(server.address())
+        ));
+    }
     let asked = Arc::new(AtomicBool::new(false));
     for signal in [signal_hook::consts::SIGTERM, signal_hook::consts::SIGINT] {
         // Asked a second time it ends at once, whatever it is doing.
@@ -152,17 +190,43 @@ fn measure(cli: &Cli, config: &Config) -> ExitCode {
     };
     let done = AtomicBool::new(false);
     let outcome = std::thread::scope(|scope| {
-        let (shared, asked, done) = (&shared, &asked, &done);
+        let (shared, asked, done) = (&*shared, &asked, &done);
         scope.spawn(move || watch(shared, asked, done));
         // Also where it panics: the scope would wait for ever.
         let _done = Done(done);
         run::run(config, shared, &mut open)
     });
+    if let Some(live) = &live {
+        live.reports.close();
+    }
+    drop(server);
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(e) => {
             log(&e.to_string());
             ExitCode::from(2)
+        }
+    }
+}
+
+/// What stands in the configuration for a password.
+fn hash_password() -> ExitCode {
+    let mut password = String::new();
+    if std::io::stdin().is_terminal() {
+        eprint!("Password: ");
+    }
+    let read = std::io::stdin().read_line(&mut password);
+    let hash = read.map_err(|e| e.to_string());
+    let hash = hash
+        .and_then(|_| Hash::of(password.trim_end_matches(['\n', '\r'])).map_err(|e| e.to_string()));
+    match hash {
+        Ok(hash) => {
+            println!("password = \"{hash}\"");
+            ExitCode::SUCCESS
+        }
+        Err(e) => {
+            log(&e);
+            ExitCode::FAILURE
         }
     }
 }
@@ -208,6 +272,7 @@ fn opener(simulate: bool) -> Result<Opener, CameraError> {
             if let Wish::Size { width, height } = config.camera.mode {
                 (scene.width, scene.height) = (width, height);
             }
+            scene.exposure_s = f64::from(config.exposure_us()) * 1e-6;
             // No faster than its rows can be read.
             let readout_ns = f64::from(scene.height) * scene.line_time_s * 1e9;
             scene.frame_period_ns = scene.frame_period_ns.max(readout_ns.ceil() as i64);

@@ -11,6 +11,8 @@ use rowtone::link::settings::{Board, Console, Limits, Settings, SettingsError};
 use rowtone::report::Report;
 use rowtone::wire::SettingsOrigin;
 
+use rowtone_page::live::Phase;
+
 use crate::alive::Alive;
 use crate::backoff::Backoff;
 use crate::capture::{CameraError, Source};
@@ -52,6 +54,14 @@ impl Keeper {
     /// Opens the file and counts this start; measuring goes on without it.
     fn open(config: &Config) -> (Self, Started) {
         let path = &config.service.state;
+        if path.as_os_str().is_empty() {
+            let started = Started {
+                session: session_by_time(),
+                settings: None,
+                origin: SettingsOrigin::Defaults,
+            };
+            return (Self::Nowhere, started);
+        }
         let store = FileFlash::open(path)
             .map(|flash| (flash, None))
             .or_else(|e| FileFlash::open_read_only(path).map(|flash| (flash, Some(e))))
@@ -97,7 +107,12 @@ fn session_by_time() -> u32 {
 /// # Errors
 /// [`SettingsError`] when the configuration's settings cannot be.
 pub fn run(config: &Config, shared: &Shared, open: &mut Open<'_>) -> Result<(), SettingsError> {
-    let (keeper, started) = Keeper::open(config);
+    let (keeper, mut started) = Keeper::open(config);
+    if let Some(saved) = started.settings {
+        let (settings, said) = config.with_saved(saved);
+        started.settings = Some(settings);
+        said.iter().for_each(|line| log(line));
+    }
     let board = Board {
         version: version(),
         // What the core can take; the line learns the picture's size when the camera is open.
@@ -165,6 +180,9 @@ fn measure(config: &Config, shared: &Shared, open: &mut Open<'_>, reports: SyncS
             Ok(Err(why)) => why,
             Err(e) => e.to_string(),
         };
+        if let Some(live) = &shared.live {
+            live.set_phase(Phase::Failed, &why);
+        }
         let wait = backoff.failed();
         log(&format!("{why}; next try in {:.1} s", wait.as_secs_f64()));
         notifier.say(&format!(

@@ -6,13 +6,14 @@
 
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use rowtone::link::settings::Settings;
 use rowtone::pipeline::{Collector, Reporter};
 use rowtone::report::Report;
 use rowtone::spectrum::FrameRatePlan;
+use rowtone_page::live::Live;
 
 use crate::alive::{Alive, Pulses};
 use crate::capture::{CameraError, Source};
@@ -22,6 +23,7 @@ use crate::journal::log;
 use crate::lines::{Lines, LinesError};
 use crate::memory::Memory;
 use crate::notify::Notifier;
+use crate::page;
 use crate::setup::Setup;
 
 /// What all threads share.
@@ -39,8 +41,21 @@ pub struct Shared {
     pub pulses: Pulses,
     /// Windows dropped because the spectrum was busy, and reports because the queue was full.
     pub dropped: AtomicU64,
+    /// What the page shows; none where there is no page.
+    pub live: Option<Arc<Live>>,
+    /// Settings that the page asks for, until the output thread takes them.
+    pub wish: Mutex<Option<PageWish>>,
     /// When the program began.
     pub started: Instant,
+}
+
+/// Settings that the page asks for.
+#[derive(Debug)]
+pub struct PageWish {
+    /// All of them.
+    pub settings: Settings,
+    /// Where the answer goes: why they cannot be used, in a sentence without a stop.
+    pub answer: SyncSender<Result<(), String>>,
 }
 
 impl Shared {
@@ -53,7 +68,18 @@ impl Shared {
             picture: AtomicU32::new(0),
             pulses: Pulses::default(),
             dropped: AtomicU64::new(0),
+            live: None,
+            wish: Mutex::new(None),
             started: Instant::now(),
+        }
+    }
+
+    /// The same with a page that shows what is measured.
+    #[must_use]
+    pub fn with_page(self, live: Arc<Live>) -> Self {
+        Self {
+            live: Some(live),
+            ..self
         }
     }
 
@@ -117,13 +143,16 @@ pub fn run(
     let clock = FrameClock::new(config.camera.replay, period_ns);
     let mut rates = FrameRates::new(setup, config, period_ns);
     let mut lines = Lines::new(setup, clock, tracker, storage.collected)?;
+    if let Some(live) = &shared.live {
+        page::describe(live, source.facts(), setup, config);
+    }
     let (ready, windows) = sync_channel(1);
     let ended = std::thread::scope(|scope| {
         let reporter = &reporter;
         // Ends when `ready` is dropped.
         let spectrum = std::thread::Builder::new().name("spectrum".to_owned());
         let spawned = spectrum.spawn_scoped(scope, move || {
-            compute(&windows, reporter, reports, shared);
+            compute(&windows, reporter, reports, shared, setup);
         });
         if let Err(e) = spawned {
             return Ended::Camera(CameraError::Refused(format!(
@@ -179,6 +208,9 @@ fn lines_until_end(
         let outcome = source.next(patience, &mut |frame| {
             start_ns = frame.start_ns;
             lines.frame(&frame, &mut |collector| handover.give(collector));
+            if let Some(live) = &shared.live {
+                lines.show(&frame, live);
+            }
         });
         match outcome {
             Ok(()) => {
@@ -286,18 +318,26 @@ fn compute(
     reporter: &Mutex<Reporter<'_>>,
     reports: &SyncSender<Report>,
     shared: &Shared,
+    setup: &Setup,
 ) {
     let mut first_ms = None;
     for ready in windows {
         shared.pulses.spectrum.beat(shared.started);
-        let mut report = match reporter.lock() {
-            Ok(mut reporter) => reporter.report(),
+        let (mut report, shapes) = match reporter.lock() {
+            Ok(mut reporter) => {
+                let report = reporter.report();
+                let shown = shared.live.is_some();
+                (report, shown.then(|| reporter.shapes().to_vec()))
+            }
             Err(_) => break,
         };
         shared.pulses.spectrum.rest();
         // The core counts from the session's first frame, a board from its own start.
         let first = *first_ms.get_or_insert(report.time_ms);
         report.time_ms = ready.offset_ms + report.time_ms.saturating_sub(first);
+        if let (Some(live), Some(shapes)) = (&shared.live, shapes) {
+            page::report(live, report.clone(), &shapes, setup, shared);
+        }
         if reports.try_send(report).is_err() {
             shared.dropped.fetch_add(1, Ordering::Relaxed);
         }

@@ -179,7 +179,7 @@ fn calibrated(file: &Path, rows: u16) -> Result<f64, SetupError> {
         ))
     })?;
     let its_rows = table.get("rows").and_then(toml::Value::as_integer);
-    if let Some(its_rows) = its_rows.filter(|&its_rows| its_rows != rows.into()) {
+    if let Some(its_rows) = its_rows.filter(|&its_rows| its_rows != i64::from(rows)) {
         let why = format!(
             "{}it was made with pictures of {its_rows} rows, and these have {rows}: calibrate in this mode, or give \
              camera.mode",

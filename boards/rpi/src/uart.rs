@@ -23,6 +23,9 @@ const STEP: Duration = Duration::from_millis(5);
 /// After the end, how long the line may take for what is left.
 const LAST_WORDS: Duration = Duration::from_secs(2);
 
+/// The port that is no port: reports as lines for people, on standard output.
+pub const TEXT: &str = "text";
+
 /// Where bytes go to and come from.
 enum Port {
     Serial(Box<dyn SerialPort>),
@@ -96,16 +99,23 @@ impl<K: Keep> Uart<'_, K> {
         let mut backoff = Backoff::new(Duration::from_millis(500), Duration::from_secs(10));
         let mut ended: Option<Instant> = None;
         let mut told = false;
+        let for_people = self.config.port == TEXT;
         loop {
             shared.pulses.output.beat(shared.started);
+            self.grant(shared);
             match reports.recv_timeout(STEP) {
-                Ok(report) => self.link.push(report),
+                Ok(report) => {
+                    if for_people && let Err(e) = print(&report) {
+                        return self.end(&e, shared);
+                    }
+                    self.link.push(report);
+                }
                 Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => {
                     ended.get_or_insert_with(Instant::now);
                 }
             }
-            if port.is_none() && backoff.is_due() {
+            if port.is_none() && !for_people && backoff.is_due() {
                 match Port::open(&self.config) {
                     Ok(open) => {
                         port = Some(open);
@@ -128,11 +138,7 @@ impl<K: Keep> Uart<'_, K> {
                 Some(Ok(idle)) => idle,
                 Some(Err(e)) => {
                     if self.config.port == "-" {
-                        // Nobody reads any more: there is nothing to measure for.
-                        shared.stop.store(true, Ordering::Relaxed);
-                        shared.pulses.output.rest();
-                        log(&format!("standard output: {e}"));
-                        return;
+                        return self.end(&e, shared);
                     }
                     let name = &self.config.port;
                     log(&format!("{name}: went away ({e}); trying again"));
@@ -140,7 +146,7 @@ impl<K: Keep> Uart<'_, K> {
                     backoff.failed();
                     false
                 }
-                None => false,
+                None => for_people,
             };
             if ended.is_some_and(|at| said || at.elapsed() > LAST_WORDS) {
                 if let Some(Port::Serial(port)) = &mut port {
@@ -154,6 +160,33 @@ impl<K: Keep> Uart<'_, K> {
                 return;
             }
         }
+    }
+
+    /// Nobody reads any more: there is nothing to measure for.
+    fn end(&self, why: &io::Error, shared: &Shared) {
+        shared.stop.store(true, Ordering::Relaxed);
+        shared.pulses.output.rest();
+        log(&format!("standard output: {why}"));
+    }
+
+    /// Uses and keeps the settings that the page asks for, and answers it.
+    fn grant(&mut self, shared: &Shared) {
+        let wish = shared.wish.try_lock().ok().and_then(|mut wish| wish.take());
+        let Some(wish) = wish else { return };
+        if let Some((width, height)) = shared.picture() {
+            self.link.set_picture(width, height);
+        }
+        let changed = self.link.change(wish.settings);
+        if changed.is_ok() {
+            self.pass_on(shared);
+            if let Err(e) = self.link.save(&mut self.store) {
+                log(&format!(
+                    "settings of the page hold until the next start: {e}"
+                ));
+            }
+        }
+        // The page may have waited long enough.
+        let _ = wish.answer.try_send(changed.map_err(|e| e.to_string()));
     }
 
     /// Takes what came, sends what is to send; whether all is said.
@@ -200,6 +233,15 @@ impl<K: Keep> Uart<'_, K> {
             shared.changes.fetch_add(1, Ordering::Release);
         }
     }
+}
+
+/// A report for people. Where the reader is slow it is left out, for nothing is to wait for him.
+fn print(report: &Report) -> io::Result<()> {
+    let mut out = io::stdout();
+    if !system::is_writable(&out, STEP) {
+        return Ok(());
+    }
+    writeln!(out, "{}", rowtone_report::text::report(report))
 }
 
 /// Time since the program began, µs.

@@ -4,7 +4,7 @@
 //! tested and fuzzed here, with deadlines for slow readers and writers that `tiny_http` has none of, and without the forty
 //! packages and the runtime that `axum` brings into everybody's first build.
 
-use std::io;
+use std::io::{self, Write};
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, TcpListener, TcpStream};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -104,6 +104,7 @@ impl Drop for Server {
 }
 
 fn accept(listener: &TcpListener, site: &Arc<Site>, stop: &AtomicBool) {
+    let full = full();
     let counts = Arc::new(Counts::default());
     for stream in listener.incoming() {
         if stop.load(Ordering::Acquire) {
@@ -118,7 +119,7 @@ fn accept(listener: &TcpListener, site: &Arc<Site>, stop: &AtomicBool) {
             }
         };
         if counts.connections.load(Ordering::Acquire) >= MAX_CONNECTIONS {
-            turn_away(&stream);
+            turn_away(stream, &full);
             continue;
         }
         let (site, counts) = (Arc::clone(site), Arc::clone(&counts));
@@ -134,16 +135,19 @@ fn accept(listener: &TcpListener, site: &Arc<Site>, stop: &AtomicBool) {
     }
 }
 
-/// Says that there are too many, without waiting for anything.
-fn turn_away(stream: &TcpStream) {
-    use std::io::Write;
+/// What is said where there are too many.
+fn full() -> Vec<u8> {
     let reply =
         Reply::refusal(503, "too many viewers: come back in a moment").with("Retry-After: 2");
     let mut bytes = reply.head(false).into_bytes();
     bytes.extend(&reply.body);
-    let mut stream = stream;
+    bytes
+}
+
+/// Says that there are too many, without waiting for anything.
+fn turn_away(mut stream: TcpStream, full: &[u8]) {
     if stream.set_nonblocking(true).is_ok() {
-        let _ = stream.write_all(&bytes);
+        let _ = stream.write_all(full);
     }
 }
 

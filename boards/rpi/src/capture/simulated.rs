@@ -28,6 +28,8 @@ pub struct Scene {
     pub height: u16,
     /// From one row to the next, s.
     pub line_time_s: f64,
+    /// Exposure of a row, s: the motion is averaged over it.
+    pub exposure_s: f64,
     /// From one frame to the next, ns.
     pub frame_period_ns: i64,
     /// Motion.
@@ -51,6 +53,7 @@ impl Default for Scene {
             width: 320,
             height: 240,
             line_time_s: 66e-6,
+            exposure_s: 0.0,
             frame_period_ns: 16_666_667,
             tones: vec![Tone { hz: 97.3, px: 0.4 }, Tone { hz: 211.7, px: 0.1 }],
             frames: None,
@@ -63,10 +66,19 @@ impl Default for Scene {
 }
 
 impl Scene {
-    /// Where the machine is, px.
+    /// Where the machine is on average over an exposure that starts at `time_s`, px.
     pub fn shift_px(&self, time_s: f64) -> f64 {
-        let tones = self.tones.iter();
-        tones.map(|t| t.px * (TAU * t.hz * time_s).sin()).sum()
+        let middle_s = time_s + 0.5 * self.exposure_s;
+        let tones = self.tones.iter().map(|t| {
+            let half_turn = TAU / 2.0 * t.hz * self.exposure_s;
+            let averaged = if half_turn == 0.0 {
+                1.0
+            } else {
+                half_turn.sin() / half_turn
+            };
+            averaged * t.px * (TAU * t.hz * middle_s).sin()
+        });
+        tones.sum()
     }
 
     /// One frame, 8-bit, row by row.

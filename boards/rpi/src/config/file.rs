@@ -4,7 +4,7 @@ use std::fmt::Display;
 use std::ops::RangeInclusive;
 use std::path::PathBuf;
 
-use rowtone::link::settings::Region;
+use rowtone::link::settings::{Key, Region};
 use rowtone::report::MAX_PEAKS;
 use rowtone::wire::Format;
 use serde::Deserialize;
@@ -21,6 +21,7 @@ struct File {
     measure: Measure,
     output: Output,
     service: Service,
+    page: Page,
 }
 
 #[derive(Deserialize, Default)]
@@ -70,6 +71,15 @@ struct Service {
     realtime_priority: Maybe<u8>,
     silence_s: Maybe<f64>,
     state: Option<PathBuf>,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(deny_unknown_fields, default)]
+struct Page {
+    listen: Maybe<String>,
+    password: Maybe<String>,
+    names: Vec<String>,
+    clip_mib: Maybe<u32>,
 }
 
 /// Turns places in the text into errors.
@@ -149,10 +159,64 @@ pub(super) fn read(text: &str, name: &str) -> Result<Config, ConfigError> {
     if let Some(state) = &service.state {
         config.service.state.clone_from(state);
     }
+    reader.page(&file.page, &mut config)?;
+    config.given = given(&file);
     Ok(config)
 }
 
+/// The settings that the file names.
+fn given(file: &File) -> Vec<Key> {
+    let File {
+        camera,
+        measure,
+        output,
+        ..
+    } = file;
+    let named = [
+        (Key::Roi, camera.roi.is_some()),
+        (Key::Window, measure.window_s.is_some()),
+        (Key::Hop, measure.hop_s.is_some()),
+        (Key::MaxPeaks, measure.max_peaks.is_some()),
+        (Key::FalseAlarm, measure.false_alarm.is_some()),
+        (Key::MinHz, measure.min_hz.is_some()),
+        (Key::MaxHz, measure.max_hz.is_some()),
+        (Key::UmPerPx, measure.um_per_px.is_some()),
+        (Key::Wire, output.wire.is_some()),
+        (Key::Unit, output.unit.is_some()),
+    ];
+    named
+        .into_iter()
+        .filter_map(|(key, is_named)| is_named.then_some(key))
+        .collect()
+}
+
 impl Reader<'_> {
+    fn page(&self, file: &Page, config: &mut Config) -> Result<(), ConfigError> {
+        let page = &mut config.page;
+        if let Some(listen) = &file.listen {
+            page.listen = match listen.get_ref().as_str() {
+                "off" => None,
+                text => Some(text.parse().map_err(|_| {
+                    let what = format!(
+                        "page.listen is {text:?}: give an address and port as 0.0.0.0:7357, or off"
+                    );
+                    self.error(Some(listen.span().start), what)
+                })?),
+            };
+        }
+        if let Some(password) = file.password.as_ref().filter(|p| !p.get_ref().is_empty()) {
+            let hash = password.get_ref().parse();
+            page.password = Some(hash.map_err(|e| {
+                let what = format!("page.password: {e}: make it with `rowtone-rpi password`");
+                self.error(Some(password.span().start), what)
+            })?);
+        }
+        page.names.clone_from(&file.names);
+        let mib = self.number("page.clip_mib", &file.clip_mib, 0..=4096)?;
+        page.clip_bytes = mib.map_or(page.clip_bytes, |mib| (mib as usize) << 20);
+        Ok(())
+    }
+
     fn camera(&self, file: &Camera, config: &mut Config) -> Result<(), ConfigError> {
         let camera = &mut config.camera;
         camera.id.clone_from(&file.id);
@@ -288,6 +352,7 @@ mod tests {
         assert_eq!(config.camera.id.as_deref(), Some("imx477"));
         assert_eq!(config.settings.max_hz, Some(1000.0));
         assert_eq!(config.output, Config::defaults().output);
+        assert_eq!(config.page, Config::defaults().page);
         assert_eq!(config.service, Config::defaults().service);
     }
 
@@ -313,6 +378,41 @@ mod tests {
         assert!(refused("[camera]\nroi = [0, 0, 8, 8]").contains("camera.roi"));
         assert!(refused("[camera\n").starts_with("f.toml:1: "));
         assert!(refused("[measure]\nmin_hz = nan").starts_with("f.toml:2: measure.min_hz is NaN"));
+    }
+
+    #[test]
+    fn the_file_has_the_last_word_on_what_it_names() {
+        let config = read("[measure]\nwindow_s = 0.5\n[output]\nwire = \"text\"", "f").unwrap();
+        let saved = rowtone::link::settings::Settings {
+            window_s: 2.0,
+            hop_s: 1.0,
+            um_per_px: Some(7.0),
+            wire: Format::Modbus,
+            ..Default::default()
+        };
+        let (settings, said) = config.with_saved(saved);
+        assert_eq!((settings.window_s, settings.wire), (0.5, Format::Text));
+        assert_eq!((settings.hop_s, settings.um_per_px), (0.5, Some(7.0)));
+        let said = said.join("\n");
+        for line in [
+            "window is 0.5, as the file says, and not 2, as was saved",
+            "wire is text, as the file says, and not modbus, as was saved",
+            "um-per-px is 7, as was saved; the file does not name it",
+        ] {
+            assert!(said.lines().any(|said| said == line), "{said}");
+        }
+    }
+
+    #[test]
+    fn the_page_is_where_the_file_says() {
+        let page = |text: &str| read(&format!("[page]\n{text}"), "f").map(|config| config.page);
+        assert_eq!(page("listen = \"off\"").unwrap().listen, None);
+        let listen = page("listen = \"127.0.0.1:80\"").unwrap().listen;
+        assert_eq!(listen, Some(([127, 0, 0, 1], 80).into()));
+        let error = page("listen = \"7357\"").unwrap_err().to_string();
+        assert!(error.starts_with("f:2: page.listen is \"7357\""), "{error}");
+        let error = page("password = \"open sesame\"").unwrap_err().to_string();
+        assert!(error.contains("`rowtone-rpi password`"), "{error}");
     }
 
     #[test]

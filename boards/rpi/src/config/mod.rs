@@ -7,9 +7,11 @@ mod file;
 mod wish;
 
 use std::fmt;
+use std::net::{Ipv4Addr, SocketAddr};
 use std::path::{Path, PathBuf};
 
-use rowtone::link::settings::Settings;
+use rowtone::link::settings::{Key, Settings};
+use rowtone_page::password::Hash;
 
 pub use wish::Wish;
 
@@ -24,6 +26,23 @@ pub struct Config {
     pub output: OutputConfig,
     /// How the program runs.
     pub service: ServiceConfig,
+    /// The page.
+    pub page: PageConfig,
+    /// The settings that the file names: there it has the last word.
+    pub given: Vec<Key>,
+}
+
+/// The page.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PageConfig {
+    /// Address and port; no page where there is none.
+    pub listen: Option<SocketAddr>,
+    /// What is kept of the password for changes; set on the page where there is none.
+    pub password: Option<Hash>,
+    /// Further names by which the device is called in its network.
+    pub names: Vec<String>,
+    /// Most bytes of the last pictures.
+    pub clip_bytes: usize,
 }
 
 /// Where lines come from.
@@ -128,6 +147,13 @@ impl Config {
                 silence_s: 2.0,
                 state: PathBuf::from("/var/lib/rowtone-rpi/settings"),
             },
+            page: PageConfig {
+                listen: Some((Ipv4Addr::UNSPECIFIED, 7357).into()),
+                password: None,
+                names: Vec::new(),
+                clip_bytes: 64 << 20,
+            },
+            given: Vec::new(),
         }
     }
 
@@ -157,6 +183,40 @@ impl Config {
     /// [`ConfigError`], with the line and key that is wrong.
     pub fn parse(text: &str, name: &str) -> Result<Self, ConfigError> {
         file::read(text, name)
+    }
+
+    /// The settings to start with, where some were saved: those, but for what the file names. And what is to be said of
+    /// that, a line each.
+    pub fn with_saved(&self, saved: Settings) -> (Settings, Vec<String>) {
+        let (mut settings, mut said) = (saved, Vec::new());
+        let text = |key: Key, settings: &Settings| {
+            let mut text = String::new();
+            // Writing to a string cannot fail.
+            let _ = key.write(settings, &mut text);
+            text.split_once('=')
+                .map_or(String::new(), |(_, value)| value.to_owned())
+        };
+        for &key in &self.given {
+            let (ours, theirs) = (text(key, &self.settings), text(key, &saved));
+            if ours != theirs && key.set(&mut settings, &ours).is_ok() {
+                let name = key.name();
+                said.push(format!(
+                    "{name} is {ours}, as the file says, and not {theirs}, as was saved"
+                ));
+            }
+        }
+        settings.hop_s = settings.hop_s.min(settings.window_s);
+        let defaults = Self::defaults().settings;
+        for key in Key::ALL {
+            let value = text(key, &settings);
+            if !self.given.contains(&key) && value != text(key, &defaults) {
+                said.push(format!(
+                    "{} is {value}, as was saved; the file does not name it",
+                    key.name()
+                ));
+            }
+        }
+        (settings, said)
     }
 
     /// Highest frequency to measure, Hz.

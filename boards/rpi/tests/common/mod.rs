@@ -49,10 +49,14 @@ pub fn file(name: &str, text: &str) -> PathBuf {
 pub fn start(name: &str, sections: &str) -> (Program, TTYPort, TTYPort) {
     let (mut ours, theirs) = TTYPort::pair().unwrap();
     ours.set_timeout(Duration::from_millis(20)).unwrap();
+    let page = match sections.contains("[page]") {
+        true => "",
+        false => "[page]\nlisten = \"off\"\n",
+    };
     let config = file(
         name,
         &format!(
-            "[camera]\nmode = \"160x120\"\nlearn_frames = 8\nexposure_us = 1\n{sections}\n\
+            "[camera]\nmode = \"160x120\"\nlearn_frames = 8\nexposure_us = 1\n{sections}\n{page}\
              [service]\nrealtime_priority = 0\nstate = \"/nonexistent/state\"\n"
         ),
     );
