@@ -267,6 +267,7 @@ fn view<'s>(
         slot_ns: storage.slot_ns,
         slot_t,
         slot_eta,
+        ends: l.ends,
         couplings: storage.samples.couplings,
         series_weight,
         score_re,

@@ -51,8 +51,8 @@ impl Orbit {
     }
 }
 
-/// Where the shape is largest, η, and its orbit there.
-pub(crate) fn largest(shape: &Shape) -> (f32, Orbit) {
+/// Where the shape is largest between the part's first and last row, η, and its orbit there.
+pub(crate) fn largest(shape: &Shape, [first, last]: [f32; 2]) -> (f32, Orbit) {
     let at = |eta: f32| Orbit::of(shape.at(&legendre(eta)));
     let rigid = shape.orders().iter().all(|&orders| orders < 2);
     let mut best = (0.0, at(0.0));
@@ -60,7 +60,7 @@ pub(crate) fn largest(shape: &Shape) -> (f32, Orbit) {
         return best;
     }
     for i in 0..PLACES {
-        let eta = 2.0 * f32::from(i) / f32::from(PLACES - 1) - 1.0;
+        let eta = first + (last - first) * f32::from(i) / f32::from(PLACES - 1);
         let orbit = at(eta);
         if orbit.semi_major_px > best.1.semi_major_px {
             best = (eta, orbit);

@@ -27,6 +27,8 @@ pub(crate) struct Loaded {
     pub(crate) zero_ns: i64,
     /// All frames came at that one rate.
     pub(crate) steady_rate: bool,
+    /// Where the part's first and last row are among those that know something, η.
+    pub(crate) ends: [f32; 2],
 }
 
 impl Loaded {
@@ -150,7 +152,7 @@ impl Loaded {
             total += sum;
         }
         let knows = |slot: usize| slot_weight[slot] + second_weight.get(slot).unwrap_or(&0.0);
-        spread_over_rows(slot_eta, knows, total, group);
+        self.ends = spread_over_rows(slot_eta, knows, total, group);
         let middle = if total > 0.0 {
             (late / total) as i64
         } else {
@@ -207,8 +209,18 @@ impl Loaded {
 /// A slot that knows less than this share of the mean does not count among the rows that know something.
 const KNOWS: f32 = 0.02;
 
-/// Where the slots' middles are from the first row that knows something, −1, to the last, 1.
-fn spread_over_rows(eta: &mut [f32], weight: impl Fn(usize) -> f32, total: f32, group: &Group) {
+/// Beyond the rows that know something a shape is told this far, η: a border that has no neighbours to
+/// compare with, not a sky.
+const BORDER: f32 = 0.08;
+
+/// Where the slots' middles are from the first row that knows something, −1, to the last, 1. Gives where the
+/// middles of the part's first and last row are, or the farthest place beyond those that a shape is told for.
+fn spread_over_rows(
+    eta: &mut [f32],
+    weight: impl Fn(usize) -> f32,
+    total: f32,
+    group: &Group,
+) -> [f32; 2] {
     let slots = eta.len();
     let mean = total / slots.max(1) as f32;
     let knows = |slot: &usize| weight(*slot) > KNOWS * mean;
@@ -222,4 +234,6 @@ fn spread_over_rows(eta: &mut [f32], weight: impl Fn(usize) -> f32, total: f32, 
         let middle = slot as f32 * rows + 0.5 * f32::from(group.rows_of(slot as u16));
         *eta = ((middle - begin) / half - 1.0).clamp(-1.0, 1.0);
     }
+    let all = f32::from(group.timing().rows());
+    [0.5, all - 0.5].map(|row| ((row - begin) / half - 1.0).clamp(-1.0 - BORDER, 1.0 + BORDER))
 }

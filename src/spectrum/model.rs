@@ -61,6 +61,8 @@ pub(crate) struct Samples<'a> {
     pub(crate) slot_t: &'a mut [f32],
     /// Where a slot is among the rows that know something, −1 to 1.
     pub(crate) slot_eta: &'a [f32],
+    /// Where the part's first and last row are in the same measure: shapes are told from one to the other.
+    pub(crate) ends: [f32; 2],
     /// How the two series of a slot see both axes.
     pub(crate) couplings: &'a [SlotCoupling],
     /// Sum of weights of each series.

@@ -121,26 +121,29 @@ pub(crate) fn over_rows(
     scale: Scale,
 ) -> PeakShape {
     let slots = samples.knowing();
-    let per_sample = u32::from(group.rows_per_sample());
-    let begin = slots.start as u32 * per_sample;
+    let per_sample = f32::from(group.rows_per_sample());
+    let begin = slots.start as f32 * per_sample;
     let last = slots.end.saturating_sub(1) as u16;
-    let end = u32::from(last) * per_sample + u32::from(group.rows_of(last));
-    let rows = end.saturating_sub(begin).max(1);
+    let end = f32::from(last) * per_sample + f32::from(group.rows_of(last));
+    let half = (0.5 * (end - begin)).max(0.5);
+    let most = f32::from(group.timing().rows().saturating_sub(1));
     let mut shape = PeakShape {
         hz: tone.frequency.hz(),
         ..PeakShape::default()
     };
+    let [from, to] = samples.ends;
     for i in 0..SHAPE_ROWS {
-        let eta = 2.0 * i as f32 / (SHAPE_ROWS - 1) as f32 - 1.0;
+        let eta = from + (to - from) * i as f32 / (SHAPE_ROWS - 1) as f32;
         let [x, y] = match bands.and_then(|b| nearest(b, eta)) {
             Some(orbit) => orbit.amplitudes,
             None => tone.shape.at(&legendre(eta)),
         };
         let (x_px, x_phase_rad) = scale.polar(x, tone.frequency);
         let (y_px, y_phase_rad) = scale.polar(y, tone.frequency);
-        let row = begin + (0.5 * (eta + 1.0) * (rows - 1) as f32 + 0.5) as u32;
+        // A row's middle is half a row below its upper edge.
+        let row = begin + (eta + 1.0) * half - 0.5;
         let _ = shape.rows.push(ShapeRow {
-            row: row as u16,
+            row: libm::roundf(row.clamp(0.0, most)) as u16,
             x_px,
             x_phase_rad,
             y_px,

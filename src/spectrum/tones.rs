@@ -274,7 +274,7 @@ impl Telling<'_> {
         let Some(tone) = model.tones.get(i) else {
             return told;
         };
-        let (eta, orbit) = largest(&tone.shape);
+        let (eta, orbit) = largest(&tone.shape, samples.ends);
         let length_s = samples.length_s;
         let along = |towards: [Complex; 2]| {
             let along = direction(eta, towards);
