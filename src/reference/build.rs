@@ -3,6 +3,7 @@
 //! A board must not spend a whole row's work in one line time, so the work is a small state machine:
 //! [`Build::advance`] does the next few columns of the present step. On a desktop one call does all.
 
+mod smooth_light;
 mod vertical;
 
 use super::align::UNKNOWN_STEPS;

@@ -1,7 +1,8 @@
 //! From a row of the reference and the rows next to it to the coefficients of its second inner product.
 //!
 //! The first product's coefficients h are made of ∂r/∂x, these of ∂r/∂y: weighted by the inverse variance, freed of the
-//! reference's noise, and made orthogonal to 1 and r in the same way, and then to the row's answer to a shift along x,
+//! reference's noise, and made orthogonal to r and to light that changes smoothly along the row ([`SmoothLight`]), and then to
+//! the row's answer to a shift along x,
 //!
 //! ```text
 //! h' ← h' − γ·h,      γ = Σ h'·∂r/∂x / Σ h·∂r/∂x,
@@ -16,6 +17,7 @@
 //! answers, h' to y, has the reference's noise in it; h' to x has that of what γ brought in.
 
 use super::super::static_pixels::LEFT_OUT;
+use super::smooth_light::SmoothLight;
 use super::{Build, LAGS, Step, WORST_SD_PX, correlation, inverse};
 use crate::reference::{
     Recipe, RowTable, Two, VerticalTable,
@@ -117,6 +119,7 @@ enum VerticalStep {
 #[derive(Clone, Copy, Debug)]
 pub struct VerticalBuild {
     build: Build,
+    light: SmoothLight,
     table: RowTable,
     step: VerticalStep,
     column: usize,
@@ -155,6 +158,7 @@ impl VerticalBuild {
     pub fn new(recipe: &Recipe, frames: f32, table: RowTable, reach: usize) -> Self {
         Self {
             build: Build::new(recipe, frames),
+            light: SmoothLight::default(),
             table,
             step: VerticalStep::Prepare(Step::Weigh),
             column: 0,
@@ -304,15 +308,41 @@ impl VerticalBuild {
                 VerticalStep::Prepare(Step::Balance)
             }
             Step::Balance => {
-                build.balance(span, mean, w, h);
+                self.balance(span, mean, w, h);
                 if ended {
-                    build.alpha_beta = build.sums.solve();
+                    self.light.solve();
                 }
                 VerticalStep::Prepare(Step::Orthogonalise)
             }
             _ => {
-                build.orthogonalise(span, mean, w, h);
+                self.orthogonalise(span, mean, w, h);
                 VerticalStep::Lean
+            }
+        }
+    }
+
+    fn balance(&mut self, span: Range<usize>, mean: &[u16], w: &[f32], h: &[f32]) {
+        let (width, centre) = (mean.len(), self.build.centre(mean.len()));
+        for x in span {
+            let (Some(&count), Some(&w), Some(&h)) = (mean.get(x), w.get(x), h.get(x)) else {
+                return;
+            };
+            if h != 0.0 {
+                let r = self.build.value(count) - centre;
+                self.light.add(x, width, [w, r, h]);
+            }
+        }
+    }
+
+    /// h' ← h' − w·(smooth light + β·r).
+    fn orthogonalise(&mut self, span: Range<usize>, mean: &[u16], w: &[f32], h: &mut [f32]) {
+        let (width, centre) = (mean.len(), self.build.centre(mean.len()));
+        for x in span {
+            let (Some(&count), Some(&w), Some(h)) = (mean.get(x), w.get(x), h.get_mut(x)) else {
+                return;
+            };
+            if *h != 0.0 {
+                *h -= w * self.light.at(x, width, self.build.value(count) - centre);
             }
         }
     }
