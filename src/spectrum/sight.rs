@@ -4,7 +4,7 @@ use super::model::Samples;
 use super::shape::{Coupling, Shape, Sight, legendre};
 
 /// Where one direction knows less than this share of what the other does, all edges lean one way.
-const LEAST_RATIO: f32 = 3e-3;
+const LEAST_RATIO: f32 = 1e-2;
 
 /// Edges that lean by no more than this, rad, are upright.
 const UPRIGHT: f32 = 2e-3;

@@ -34,6 +34,15 @@ const KEPT_ENOUGH: f32 = 0.6;
 /// Nearer than this many 1/T to an image of a larger tone, a tone is ambiguous.
 const AS_IMAGE: f32 = 1.0;
 
+/// From this swing on, px, rows' answers bend so far that harmonics have images ...
+const SWING_PX: f32 = 0.7;
+
+/// ... up to this one (the third is as large, but one in eight other tones would be doubted for it) ...
+const BENT_HARMONICS: u8 = 2;
+
+/// ... and up to this share of the swing.
+const SMALL_SHARE: f32 = 0.05;
+
 /// From this power over the noise on it is looked at what a tone's shape leaves at its alias frequency: 20 dB.
 const STRONG: f32 = 100.0;
 
@@ -379,7 +388,8 @@ impl Telling<'_> {
         }
     }
 
-    /// What is at an image of a larger tone may be that one's, or a tone of its own.
+    /// What is at an image of a larger tone may be that one's, or a tone of its own; beside a swing of the order of a
+    /// pixel so may what is small at an image of its harmonics: a row's answer bends in a way of its own.
     fn doubt_images(&self, length_s: f32, list: &mut [(Peak, f32)]) {
         let Some(fps) = self.band.fps else { return };
         for i in 1..list.len() {
@@ -388,8 +398,12 @@ impl Telling<'_> {
                 return;
             };
             peak.ambiguous |= larger.iter().any(|(other, _)| {
-                [peak.hz - other.hz, peak.hz + other.hz]
-                    .iter()
+                let bent = other.amplitude_px > SWING_PX
+                    && peak.amplitude_px < SMALL_SHARE * other.amplitude_px;
+                let harmonics = if bent { BENT_HARMONICS } else { 1 };
+                (1..=harmonics)
+                    .map(|m| f32::from(m) * other.hz)
+                    .flat_map(|hz| [peak.hz - hz, peak.hz + hz])
                     .any(|apart| {
                         let k = libm::roundf(apart / fps);
                         k != 0.0 && (apart - k * fps).abs() * length_s < AS_IMAGE

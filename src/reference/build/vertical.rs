@@ -590,7 +590,7 @@ fn correlation_within(
 }
 
 /// Least information along the edges, as a share of that across them.
-const LEAST_SHARE: f32 = 3e-3;
+const LEAST_SHARE: f32 = 1e-2;
 
 /// A row may know of y that much less than of x and still be of use, in units of what [`WORST_SD_PX`] asks for.
 const LEAST_INFORMATION: f32 = 0.25;
