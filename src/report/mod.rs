@@ -6,7 +6,7 @@ mod warnings;
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
-pub use motion::{MAX_SHAPES, Motion, PeakShape, SHAPE_ROWS, ShapeRow};
+pub use motion::{MAX_SHAPES, Modulation, Motion, PeakShape, SHAPE_ROWS, ShapeRow};
 pub use warnings::{Warning, Warnings};
 
 /// Most peaks one report can hold.

@@ -33,6 +33,22 @@ pub struct Motion {
     pub decay_s: Option<f32>,
     /// How fast its frequency rises, Hz/s, where it changes within the window; the peak's is that in the window's middle.
     pub hz_per_s: Option<f32>,
+    /// Its amplitude or its phase swings faster than the window is long: what would be sidebands of it.
+    pub modulation: Option<Modulation>,
+    /// Its frequency wanders within the window: the peak's is the centroid of several lines, its amplitude the root of the
+    /// sum of their squares, and this their root mean square distance from the centroid, Hz.
+    pub spread_hz: Option<f32>,
+}
+
+/// How a tone's amplitude or phase swings.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Modulation {
+    /// How often a second, Hz.
+    pub hz: f32,
+    /// By which share of the mean amplitude either way, 0 to 1; of a phase, by how many rad.
+    pub depth: f32,
+    /// It is the phase that swings, not the amplitude.
+    pub of_phase: bool,
 }
 
 /// How a peak's motion runs over the rows.

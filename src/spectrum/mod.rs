@@ -46,6 +46,7 @@ mod residual;
 mod rows;
 mod search;
 mod shape;
+mod sidebands;
 mod sight;
 mod small;
 mod smear;

@@ -10,6 +10,7 @@ use super::model::Samples;
 use super::motion::{Bands, Scale, believe_bands, over_rows};
 use super::periodogram::Band;
 use super::residual::Residual;
+use super::sidebands::{Found, List, name_groups, name_modulations};
 use super::smear::Smear;
 use super::timebase::Look;
 use super::tone::Tone;
@@ -97,9 +98,6 @@ pub(crate) struct Telling<'a> {
     pub(crate) since_begin_ns: i64,
 }
 
-/// Peaks and how fast their frequencies change.
-type List = heapless::Vec<(Peak, f32), MAX_PEAKS>;
-
 /// Shapes over the rows of the peaks that are not rigid.
 pub(crate) type Shapes = heapless::Vec<PeakShape, MAX_SHAPES>;
 
@@ -161,13 +159,16 @@ impl Telling<'_> {
         let unexplained = plain.squares / Fit::freedom(samples, plain).max(1.0);
         self.check_time_base(samples, fit, (plain, unexplained), &mut tones);
         largest_first(&mut list);
+        name_modulations(&mut list, samples.length_s);
+        name_groups(&mut list, samples.length_s);
+        largest_first(&mut list);
         self.doubt_images(samples.length_s, &mut list);
         tones.more = list.len() > self.config.max_peaks;
         list.truncate(self.config.max_peaks);
-        shapes.retain(|s| list.iter().any(|(p, _)| p.hz == s.hz));
-        for (peak, slope) in &list {
-            let _ = tones.peaks.push(*peak);
-            let _ = tones.hz_per_s.push(*slope);
+        shapes.retain(|s| list.iter().any(|f| f.peak.hz == s.hz));
+        for found in &list {
+            let _ = tones.peaks.push(found.peak);
+            let _ = tones.hz_per_s.push(found.hz_per_s);
         }
         let (low, high) = self.asked_hz();
         tones.hidden = self.band.fps.is_some_and(|fps| {
@@ -257,7 +258,12 @@ impl Telling<'_> {
             // In the middle of the window; the fit knows it in the middle of its samples.
             let mut peak = peak;
             peak.hz += slope * self.middle_s;
-            let _ = list.push((peak, slope));
+            let _ = list.push(Found {
+                peak,
+                hz_per_s: slope,
+                amplitude: told.orbit.amplitudes[axis],
+                axis,
+            });
             if !told.rigid {
                 let _ = shapes.push(over_rows(
                     samples,
@@ -384,20 +390,22 @@ impl Telling<'_> {
                 .map(|_| samples.length_s / (-tone.growth).max(1e-6)),
             hz_per_s: (tone.modulated && tone.onset.is_none())
                 .then(|| tone.chirp / (samples.length_s * samples.length_s)),
+            modulation: None,
+            spread_hz: None,
             rigid: told.rigid,
         }
     }
 
     /// What is at an image of a larger tone may be that one's, or a tone of its own; beside a swing of the order of a
     /// pixel so may what is small at an image of its harmonics: a row's answer bends in a way of its own.
-    fn doubt_images(&self, length_s: f32, list: &mut [(Peak, f32)]) {
+    fn doubt_images(&self, length_s: f32, list: &mut [Found]) {
         let Some(fps) = self.band.fps else { return };
         for i in 1..list.len() {
             let (larger, rest) = list.split_at_mut(i);
-            let Some((peak, _)) = rest.first_mut() else {
+            let Some(Found { peak, .. }) = rest.first_mut() else {
                 return;
             };
-            peak.ambiguous |= larger.iter().any(|(other, _)| {
+            peak.ambiguous |= larger.iter().any(|Found { peak: other, .. }| {
                 let bent = other.amplitude_px > SWING_PX
                     && peak.amplitude_px < SMALL_SHARE * other.amplitude_px;
                 let harmonics = if bent { BENT_HARMONICS } else { 1 };
@@ -436,10 +444,10 @@ fn is_sound(peak: &Peak) -> bool {
 }
 
 /// Insertion: there are sixteen at most, and the library's sort is 2 KiB of flash.
-fn largest_first(list: &mut [(Peak, f32)]) {
+fn largest_first(list: &mut [Found]) {
     for end in 1..list.len() {
         for i in (0..end).rev() {
-            if list[i].0.amplitude_px >= list[i + 1].0.amplitude_px {
+            if list[i].peak.amplitude_px >= list[i + 1].peak.amplitude_px {
                 break;
             }
             list.swap(i, i + 1);

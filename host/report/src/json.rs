@@ -68,6 +68,18 @@ struct MotionObject {
     decay_s: Option<f32>,
     #[serde(skip_serializing_if = "Option::is_none")]
     hz_per_s: Option<f32>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    modulation: Option<ModulationObject>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    spread_hz: Option<f32>,
+}
+
+/// How a tone swings: `of` is `amplitude` or `phase`.
+#[derive(Serialize)]
+struct ModulationObject {
+    hz: f32,
+    depth: f32,
+    of: &'static str,
 }
 
 impl MotionObject {
@@ -83,6 +95,12 @@ impl MotionObject {
             rigid: motion.rigid,
             decay_s: motion.decay_s,
             hz_per_s: motion.hz_per_s,
+            modulation: motion.modulation.map(|m| ModulationObject {
+                hz: m.hz,
+                depth: m.depth,
+                of: if m.of_phase { "phase" } else { "amplitude" },
+            }),
+            spread_hz: motion.spread_hz,
         }
     }
 }
@@ -248,6 +266,8 @@ mod tests {
             rigid: false,
             decay_s: None,
             hz_per_s: None,
+            modulation: None,
+            spread_hz: None,
         });
         let row = ShapeRow {
             row: 7,
