@@ -19,6 +19,7 @@ mod gap;
 mod learn;
 mod light;
 mod line;
+mod memory;
 mod overlap;
 #[cfg(feature = "long-exposure")]
 mod path;
@@ -38,6 +39,7 @@ pub use crate::reference::{
 };
 pub use config::{Axes, Config, ConfigError};
 pub use counts::Counts;
+pub use memory::picture_bytes;
 
 use crate::{
     camera::{Line, Pixels, UpperBytes},
