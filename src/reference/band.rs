@@ -8,7 +8,7 @@
 //!
 //! What is kept here is the band's *derivative* filter: an antisymmetric FIR filter that is d/dx times a
 //! smoothing. Convolved with the reference it gives the coefficients h of the line's inner product
-//! (estimator.md of the project's design, section 2; Guo & Labate 2007 for the shearlet's cone).
+//! (docs/line-engine.md; Guo & Labate 2007 for the shearlet's cone).
 
 /// How coarse the band is. A finer level keeps more of a sharp picture's information, a coarser one
 /// leaves out noise where the lens passes nothing anyway.

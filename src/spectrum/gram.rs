@@ -279,7 +279,7 @@ impl Samples<'_> {
         products
     }
 
-    /// Share of a steady tone's energy that the removal of the slots' offsets leaves, c(f) of estimator.md.
+    /// Share of a steady tone's energy that the removal of the slots' offsets leaves, c(f) of docs/spectrum.md.
     pub(crate) fn kept(&self, means: &FrameMeans) -> f32 {
         (1.0 - means[0].norm_sqr()).clamp(0.0, 1.0)
     }

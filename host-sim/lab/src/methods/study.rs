@@ -118,7 +118,7 @@ pub fn score(method: &dyn Method, recording: &Recording, hz: f64) -> Score {
     }
 }
 
-/// Tones on the rows that exist, each row's unknown offset taken into account (estimator.md section 4).
+/// Tones on the rows that exist, each row's unknown offset taken into account (docs/spectrum.md).
 #[derive(Debug)]
 pub struct Fit<'a> {
     recording: &'a Recording,

@@ -107,7 +107,7 @@ mod tests {
 
     #[test]
     fn agrees_with_the_closed_form_without_gaps() {
-        // estimator.md section 4: σ_f = 0.78·σ/(A·T·√N), σ_A = σ·√(2/N).
+        // docs/line-engine.md: σ_f = 0.78·σ/(A·T·√N), σ_A = σ·√(2/N).
         let samples: Vec<Sample> = (0..2000)
             .map(|i| Sample {
                 curvature: Default::default(),
