@@ -3,6 +3,7 @@
 #
 #   tools/test-names.sh            prints them, sorted: target and name
 #   tools/test-names.sh --check    says which names of tests/names.txt are gone, and fails if there are any
+#   tools/test-names.sh --sources  the same in a second, by what the sources say, without the doc tests
 #
 # A name may move: what counts is its last part (of a doc test, the item it belongs to), and how often it occurs.
 # Where a test was merged or dropped, its line in tests/names.txt ends with ` # REASON`.
@@ -62,19 +63,32 @@ names() {
     { built && in_sources; } | LC_ALL=C sort
 }
 
+gone() { # NOW BEFORE: says which names of the second list are not in the first, and fails if there are any
+    awk '
+        function last(line) { sub(/ # .*/, "", line); sub(/.*(::| )/, "", line); return line }
+        FNR == NR { left[last($0)]++; next }
+        / # / || /^#/ { next }
+        left[last($0)]-- <= 0 { print "gone: " $0; gone++ }
+        END { exit (gone > 0) }' "$1" "$2"
+}
+
 case ${1:-} in
     '') names ;;
-    --check)
+    --check | --sources)
         now=$(mktemp)
-        trap 'rm "$now"' EXIT
-        names >"$now"
-        awk '
-            function last(line) { sub(/ # .*/, "", line); sub(/.*(::| )/, "", line); return line }
-            FNR == NR { left[last($0)]++; next }
-            / # / || /^#/ { next }
-            left[last($0)]-- <= 0 { print "gone: " $0; gone++ }
-            END { exit (gone > 0) }' "$now" tests/names.txt
+        before=$(mktemp)
+        trap 'rm "$now" "$before"' EXIT
+        if [ "$1" = --check ]; then
+            names >"$now"
+            cp tests/names.txt "$before"
+        else
+            git ls-files '*.rs' | while read -r file; do tests_of "$file"; done >"$now"
+            grep -v -e ' doc ' -e '^fuzz target ' tests/names.txt >"$before"
+            # Fewer than a name a line is a list that was not read.
+            [ "$(wc -l <"$before")" -gt 500 ]
+        fi
+        gone "$now" "$before"
         echo "all names of tests/names.txt are still there ($(wc -l <"$now") tests)"
         ;;
-    *) echo "usage: tools/test-names.sh [--check]" >&2 && exit 2 ;;
+    *) echo "usage: tools/test-names.sh [--check | --sources]" >&2 && exit 2 ;;
 esac
