@@ -12,17 +12,15 @@ use rowtone::spectrum;
 use rowtone::timeline::{Binner, Displacement, Group};
 use rowtone::tracker::{self, Axes, Config, Outcome};
 use rowtone::wire::{Message, binary, text};
+use rowtone_chance::{Chance, XorShiftStar};
 
-/// A small fast generator (xorshift64*, Vigna 2016).
-struct Dice(u64);
+struct Dice(XorShiftStar);
 
 impl Dice {
     fn roll(&mut self) -> u64 {
-        self.0 ^= self.0 >> 12;
-        self.0 ^= self.0 << 25;
-        self.0 ^= self.0 >> 27;
-        self.0.wrapping_mul(0x2545_f491_4f6c_dd1d)
+        self.0.next()
     }
+
     fn below(&mut self, end: u64) -> u64 {
         (self.roll() >> 16) % end.max(1)
     }
@@ -112,7 +110,7 @@ proptest! {
         mask in any::<u8>(), seed in 1u64.., first_frame in prop_oneof![Just(0u32), any::<u32>()],
         rows_per_sample in 1u16..8, wild in any::<bool>(), scattered in any::<bool>(), room in 0usize..300,
     ) {
-        let mut dice = Dice(seed);
+        let mut dice = Dice(XorShiftStar(seed));
         let (width, rows) = (usize::from(config.width), usize::from(config.rows));
         let columns = (0..width).map(|_| match mask {
             0..100 => 255,

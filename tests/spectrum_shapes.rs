@@ -7,25 +7,9 @@ use rowtone::pipeline::ReportSide;
 use rowtone::report::{Peak, PeakShape, Report};
 use rowtone::spectrum::{Config, StaticCouplings, StaticStorage};
 use rowtone::timeline::{Group, Sample, Vertical, rows_per_sample};
+use rowtone_chance::{Chance, Mmix};
 
 type Memory = StaticStorage<8192, 128, 128, 16384, 17>;
-
-/// Normal noise of a fixed seed: the sum of twelve even ones.
-struct Noise(u64);
-
-impl Noise {
-    fn draw(&mut self) -> f64 {
-        (0..12).map(|_| self.unit()).sum::<f64>() - 6.0
-    }
-
-    fn unit(&mut self) -> f64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
-    }
-}
 
 const FPS: f64 = 60.0;
 const NOISE_PX: f64 = 0.003;
@@ -40,11 +24,11 @@ fn report(seed: u64, motion: impl Fn(f64, f64) -> f64) -> Report {
 fn analysis(seed: u64, motion: impl Fn(f64, f64) -> f64) -> (Report, Vec<PeakShape>) {
     let timing = Timing::new(90_000_000, 0, 144).unwrap();
     let group = Group::new(timing, rows_per_sample(timing, 1000.0, 60, 1 << 16)).unwrap();
-    let mut noise = Noise(seed);
+    let mut noise = Mmix(seed);
     for _ in 0..4 {
         noise.unit();
     }
-    let offsets: Vec<f64> = (0..group.slots()).map(|_| 0.1 * noise.draw()).collect();
+    let offsets: Vec<f64> = (0..group.slots()).map(|_| 0.1 * noise.bell()).collect();
     let mut memory = Box::new(Memory::new());
     let mut reports = ReportSide::new(Config::default(), group, memory.lend()).unwrap();
     for frame in 0..60_u32 {
@@ -58,7 +42,7 @@ fn analysis(seed: u64, motion: impl Fn(f64, f64) -> f64) -> (Report, Vec<PeakSha
                 slot,
                 curvature: Default::default(),
                 time_ns,
-                shift_px: (moved + NOISE_PX * noise.draw()) as f32,
+                shift_px: (moved + NOISE_PX * noise.bell()) as f32,
                 information_per_px2: (1.0 / (NOISE_PX * NOISE_PX)) as f32,
                 vertical: None,
                 spread: group.even_spread(),
@@ -143,15 +127,15 @@ fn leaning(seed: u64, coupling: f64, motion: impl Fn(f64) -> [f64; 2]) -> Report
 fn textured(seed: u64, lean: Option<f64>, motion: impl Fn(f64, f64) -> [f64; 2]) -> Report {
     let timing = Timing::new(90_000_000, 0, 144).unwrap();
     let group = Group::new(timing, rows_per_sample(timing, 1000.0, 60, 1 << 16)).unwrap();
-    let mut noise = Noise(seed);
+    let mut noise = Mmix(seed);
     for _ in 0..4 {
         noise.unit();
     }
     let slots: Vec<Slot> = (0..group.slots())
         .map(|_| Slot {
-            coupling: lean.unwrap_or_else(|| 0.2 * noise.draw()),
+            coupling: lean.unwrap_or_else(|| 0.2 * noise.bell()),
             noise_px: [1.0, if lean.is_some() { 1e3 } else { 1.0 }]
-                .map(|wide| wide * NOISE_PX * (0.3 * noise.draw()).exp()),
+                .map(|wide| wide * NOISE_PX * (0.3 * noise.bell()).exp()),
         })
         .collect();
     let mut memory = Box::new(Memory::new());
@@ -171,10 +155,10 @@ fn textured(seed: u64, lean: Option<f64>, motion: impl Fn(f64, f64) -> [f64; 2])
                 slot: number,
                 curvature: Default::default(),
                 time_ns,
-                shift_px: (x + slot.coupling * y + slot.noise_px[0] * noise.draw()) as f32,
+                shift_px: (x + slot.coupling * y + slot.noise_px[0] * noise.bell()) as f32,
                 information_per_px2: information[0],
                 vertical: Some(Vertical {
-                    shift_px: (y + slot.noise_px[1] * noise.draw()) as f32,
+                    shift_px: (y + slot.noise_px[1] * noise.bell()) as f32,
                     information_per_px2: information[1],
                     coupling: slot.coupling as f32,
                     ..Vertical::default()

@@ -7,25 +7,9 @@ use rowtone::pipeline::ReportSide;
 use rowtone::report::{Report, Warning};
 use rowtone::spectrum::{Config, StaticStorage};
 use rowtone::timeline::{Group, Sample, rows_per_sample};
+use rowtone_chance::{Chance, Mmix};
 
 type Memory = StaticStorage<8192, 128, 128, 16384, 17>;
-
-/// Normal noise of a fixed seed: the sum of twelve even ones.
-struct Noise(u64);
-
-impl Noise {
-    fn draw(&mut self) -> f64 {
-        (0..12).map(|_| self.unit()).sum::<f64>() - 6.0
-    }
-
-    fn unit(&mut self) -> f64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
-    }
-}
 
 const ROWS: u16 = 300;
 const LINE_US: f64 = 40.0;
@@ -53,11 +37,11 @@ fn report(seed: u64, said: Said, motion: impl Fn(f64, f64) -> f64) -> Report {
     let timing = Timing::new(line_ps, 0, ROWS).unwrap();
     let rows = rows_per_sample(timing, 1000.0 / said.line as f32, 60, 1 << 16);
     let group = Group::new(timing, rows).unwrap();
-    let mut noise = Noise(seed);
+    let mut noise = Mmix(seed);
     for _ in 0..4 {
         noise.unit();
     }
-    let offsets: Vec<f64> = (0..group.slots()).map(|_| 0.1 * noise.draw()).collect();
+    let offsets: Vec<f64> = (0..group.slots()).map(|_| 0.1 * noise.bell()).collect();
     let mut memory = Box::new(Memory::new());
     let config = Config {
         window_ns: (1e9 / said.rate) as i64 + 1,
@@ -79,7 +63,7 @@ fn report(seed: u64, said: Said, motion: impl Fn(f64, f64) -> f64) -> Report {
                 slot,
                 curvature: Default::default(),
                 time_ns: start_ns + group.middle_ns(slot),
-                shift_px: (moved + NOISE_PX * noise.draw()) as f32,
+                shift_px: (moved + NOISE_PX * noise.bell()) as f32,
                 information_per_px2: (1.0 / (NOISE_PX * NOISE_PX)) as f32,
                 vertical: None,
                 spread: group.even_spread(),
@@ -103,7 +87,7 @@ fn machine(t: f64, _: f64) -> f64 {
 /// deviations of each of some 1000 tones noise would flag one in 1700 such sets.)
 #[test]
 fn a_right_time_base_is_not_doubted() {
-    let mut dice = Noise(77);
+    let mut dice = Mmix(77);
     for seed in 0..400 {
         let mut tones: Vec<[f64; 4]> = Vec::new();
         while tones.len() < 1 + seed as usize % 4 {

@@ -7,25 +7,9 @@ use rowtone::pipeline::ReportSide;
 use rowtone::report::{Peak, Report, Warning};
 use rowtone::spectrum::{Config, FrameRatePlan, StaticStorage};
 use rowtone::timeline::{Binner, Displacement, Group, rows_per_sample};
+use rowtone_chance::{Chance, Mmix};
 
 type Memory = StaticStorage<8192, 128, 128, 16384, 17>;
-
-/// Normal noise of a fixed seed: the sum of twelve even ones.
-struct Noise(u64);
-
-impl Noise {
-    fn draw(&mut self) -> f64 {
-        (0..12).map(|_| self.unit()).sum::<f64>() - 6.0
-    }
-
-    fn unit(&mut self) -> f64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
-    }
-}
 
 /// A camera that sees `motion` (px at s), its rows off by 0.1 px and noisy by `noise_px`.
 struct Camera {
@@ -37,11 +21,11 @@ struct Camera {
 impl Camera {
     fn report(&self, config: Config, seed: u64, motion: impl Fn(f64) -> f64) -> Vec<Report> {
         let timing = self.group.timing();
-        let mut noise = Noise(seed);
+        let mut noise = Mmix(seed);
         for _ in 0..4 {
             noise.unit();
         }
-        let offsets: Vec<f64> = (0..timing.rows()).map(|_| 0.1 * noise.draw()).collect();
+        let offsets: Vec<f64> = (0..timing.rows()).map(|_| 0.1 * noise.bell()).collect();
         let mut memory = Box::new(Memory::new());
         let mut report_side = ReportSide::new(config, self.group, memory.lend()).unwrap();
         let mut binner = Binner::new(self.group);
@@ -54,7 +38,7 @@ impl Camera {
                     frame: frame as u32,
                     row,
                     time_ns,
-                    shift_px: (moved + self.noise_px * noise.draw()) as f32,
+                    shift_px: (moved + self.noise_px * noise.bell()) as f32,
                     information_per_px2: (1.0 / (self.noise_px * self.noise_px)) as f32,
                     vertical: None,
                 });
@@ -179,11 +163,11 @@ fn what_is_no_steady_tone_has_no_ghosts() {
 fn uneven_rows_make_no_ghosts() {
     let timing = Timing::new(10_000_000, 0, 500).unwrap();
     let group = Group::new(timing, rows_per_sample(timing, 2000.0, 110, 1 << 16)).unwrap();
-    let mut noise = Noise(9);
+    let mut noise = Mmix(9);
     for _ in 0..4 {
         noise.unit();
     }
-    let information: Vec<f64> = (0..500).map(|_| noise.draw().exp() * 2500.0).collect();
+    let information: Vec<f64> = (0..500).map(|_| noise.bell().exp() * 2500.0).collect();
     let mut memory = Box::new(StaticStorage::<8192, 128, 128, 16384, 17>::new());
     let mut report_side = ReportSide::new(Config::default(), group, memory.lend()).unwrap();
     let mut binner = Binner::new(group);
@@ -196,7 +180,7 @@ fn uneven_rows_make_no_ghosts() {
                 frame,
                 row,
                 time_ns,
-                shift_px: (moved + noise.draw() / known.sqrt()) as f32,
+                shift_px: (moved + noise.bell() / known.sqrt()) as f32,
                 information_per_px2: known as f32,
                 vertical: None,
             });
@@ -292,7 +276,7 @@ fn ten_days_are_like_the_first_second() {
         ..Config::default()
     };
     let mut report_side = ReportSide::new(config, group, memory.lend()).unwrap();
-    let mut noise = Noise(5);
+    let mut noise = Mmix(5);
     let mut reports = Vec::new();
     let first = u32::MAX - 100_000;
     for visit in 0..960_i64 {
@@ -302,7 +286,7 @@ fn ten_days_are_like_the_first_second() {
                 let time_ns = visit * 900_000_000_000 + n * 10_000_000 + group.middle_ns(slot);
                 // 437 Hz makes whole turns in a visit's time, so a phase of its own suffices.
                 let t = (n * 10_000_000 + group.middle_ns(slot)) as f64 * 1e-9;
-                let shift = 0.1 * (TAU * 437.0 * t).cos() + 0.004 * noise.draw();
+                let shift = 0.1 * (TAU * 437.0 * t).cos() + 0.004 * noise.bell();
                 let ready = report_side.push(rowtone::timeline::Sample {
                     curvature: Default::default(),
                     frame,

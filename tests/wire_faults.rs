@@ -12,7 +12,8 @@ use std::time::Instant;
 
 use rowtone::report::Report;
 use rowtone::wire::{Message, binary, text};
-use wire_common::{Dice, harm, ordinary_report};
+use rowtone_chance::{Chance, XorShiftStar};
+use wire_common::{harm, ordinary_report};
 
 /// Bytes harmed, of all bytes.
 const RATES: [f64; 4] = [1e-5, 1e-4, 1e-3, 1e-2];
@@ -20,7 +21,7 @@ const RATES: [f64; 4] = [1e-5, 1e-4, 1e-3, 1e-2];
 /// Reports that differ in everything that can differ.
 const REPORTS: usize = 64;
 
-fn reports(dice: &mut Dice) -> Vec<Report> {
+fn reports(dice: &mut XorShiftStar) -> Vec<Report> {
     let mut real = |scale: f32| scale * (dice.below(1_000_000) as f32 / 1e6);
     let mut reports: Vec<Report> = (0..REPORTS as u32).map(ordinary_report).collect();
     for (number, report) in reports.iter_mut().enumerate() {
@@ -53,7 +54,7 @@ fn run(
     encode: impl Fn(&Message) -> Vec<u8>,
     mut push: impl FnMut(u8) -> Option<Message>,
 ) -> Outcome {
-    let mut dice = Dice::new(seed);
+    let mut dice = XorShiftStar(seed.max(1));
     let reports = reports(&mut dice);
     let session = 3;
     let encoded: Vec<Vec<u8>> = reports

@@ -6,8 +6,9 @@ use rowtone::link::Link;
 use rowtone::link::settings::store::Nowhere;
 use rowtone::wire::Format;
 use rowtone::wire::{Arrival, Message, Sequence, binary, text};
+use rowtone_chance::XorShiftStar;
 use wire_common::console::link;
-use wire_common::{Dice, harm, ordinary_report};
+use wire_common::{harm, ordinary_report};
 
 /// All that the board has to say, without waiting.
 fn drain(link: &mut Link<'_>) -> Vec<u8> {
@@ -86,7 +87,7 @@ fn a_host_that_asks_again_misses_none() {
     for wire in [Format::Text, Format::Binary] {
         let mut slots = [const { None }; 32];
         let mut link = link(&mut slots, wire);
-        let mut dice = Dice::new(2026);
+        let mut dice = XorShiftStar(2026);
         let mut text = text::Decoder::<{ text::MAX_LINE }>::new();
         let mut binary = binary::Decoder::<{ binary::MAX_FRAME }>::new();
         let mut sequence = Sequence::default();

@@ -17,15 +17,16 @@ use std::time::Instant;
 use rowtone::report::Report;
 use rowtone::wire::Format;
 use rowtone::wire::modbus::decode_report;
+use rowtone_chance::{Chance, XorShiftStar};
 use server::{Server, UNIT, read_holdings, read_inputs, registers, request};
-use wire_common::{Dice, harm, ordinary_report};
+use wire_common::{harm, ordinary_report};
 
 /// Bytes harmed, of all bytes.
 const RATES: [f64; 4] = [1e-5, 1e-4, 1e-3, 1e-2];
 
 /// What a line does to a frame: bytes harmed at a rate, and at times garbage before it or the cable
 /// pulled in the middle. At least one thing happens.
-fn fault(dice: &mut Dice, frame: &[u8], rate: f64) -> Vec<u8> {
+fn fault(dice: &mut XorShiftStar, frame: &[u8], rate: f64) -> Vec<u8> {
     let mut received = vec![];
     match dice.below(16) {
         0 => {
@@ -64,7 +65,7 @@ struct Answers {
     wrong_reports: u64,
 }
 
-fn reports(dice: &mut Dice) -> Vec<Report> {
+fn reports(dice: &mut XorShiftStar) -> Vec<Report> {
     let mut real = |scale: f32| scale * (dice.below(1_000_000) as f32 / 1e6);
     let mut reports: Vec<Report> = (0..64).map(ordinary_report).collect();
     for (number, report) in reports.iter_mut().enumerate() {
@@ -79,7 +80,7 @@ fn reports(dice: &mut Dice) -> Vec<Report> {
 
 /// A client reads reports in two frames, one of which is harmed.
 fn run_answers(trials: u64, seed: u64) -> Answers {
-    let mut dice = Dice::new(seed);
+    let mut dice = XorShiftStar(seed.max(1));
     let reports = reports(&mut dice);
     let parts = [(0, 38), (100, 80)].map(|(at, count)| (at, count, read_inputs(at, count)));
     let intact: Vec<[Vec<u8>; 2]> = (0..reports.len())
@@ -152,7 +153,7 @@ struct Requests {
 
 /// A board is sent harmed requests, each followed by an intact one after a silence.
 fn run_requests(trials: u64, seed: u64) -> Requests {
-    let mut dice = Dice::new(seed);
+    let mut dice = XorShiftStar(seed.max(1));
     let mut outcome = Requests::default();
     while outcome.harmed < trials {
         run_board(trials, &mut dice, &mut outcome);
@@ -161,7 +162,7 @@ fn run_requests(trials: u64, seed: u64) -> Requests {
 }
 
 /// [`run_requests`] until a missed fault sets another wire or unit: nobody finds the board then.
-fn run_board(trials: u64, dice: &mut Dice, outcome: &mut Requests) {
+fn run_board(trials: u64, dice: &mut XorShiftStar, outcome: &mut Requests) {
     let mut slots = [const { None }; 4];
     let mut server = Server::new(&mut slots, 115_200);
     server.link.push(ordinary_report(0));

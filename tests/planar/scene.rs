@@ -2,29 +2,7 @@
 
 use core::f64::consts::TAU;
 
-/// Knuth's MMIX generator, and what is drawn from it.
-pub(crate) struct Random(u64);
-
-impl Random {
-    pub(crate) fn new(seed: u64) -> Self {
-        Self(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1)
-    }
-
-    /// 0 to 1.
-    pub(crate) fn even(&mut self) -> f64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    /// Of a normal distribution (Box and Muller 1958).
-    pub(crate) fn normal(&mut self) -> f64 {
-        let radius = (-2.0 * self.even().max(1e-300).ln()).sqrt();
-        radius * (TAU * self.even()).cos()
-    }
-}
+use rowtone_chance::{Chance, Mmix};
 
 /// One wave of the texture: amplitude in pixel values, rad/px along x and y, phase.
 struct Wave([f64; 4]);
@@ -45,7 +23,7 @@ pub(crate) struct Scene {
     waves: Vec<Wave>,
     pub(crate) read_noise: f64,
     pub(crate) per_value: f64,
-    random: Random,
+    random: Mmix,
     pub(crate) line_s: f64,
     pub(crate) frame_s: f64,
     /// Tones along x and y: Hz, px, phase.
@@ -54,13 +32,13 @@ pub(crate) struct Scene {
 
 impl Scene {
     pub(crate) fn new(texture: Texture, width: usize, seed: u64) -> Self {
-        let mut random = Random::new(seed);
+        let mut random = Mmix(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1);
         let waves = (0..60)
             .map(|_| {
                 // Up to 0.14 cycles/px, weaker the finer: what a lens leaves.
-                let k = TAU * (0.015 + 0.125 * random.even());
+                let k = TAU * (0.015 + 0.125 * random.unit());
                 let angle = match texture {
-                    Texture::Even => TAU * random.even(),
+                    Texture::Even => TAU * random.unit(),
                     Texture::Leaning(angle) => angle + 0.26 * random.normal(),
                     Texture::OneWay(angle) => angle,
                 };
@@ -69,7 +47,7 @@ impl Scene {
                     amplitude,
                     k * angle.cos(),
                     k * angle.sin(),
-                    TAU * random.even(),
+                    TAU * random.unit(),
                 ])
             })
             .collect();

@@ -10,6 +10,7 @@ pub mod console;
 use proptest::{collection, option, prelude::*, sample};
 use rowtone::report::{MAX_PEAKS, Peak, Report, Warnings};
 use rowtone::wire::{MAX_VALUE, Message, REPLY_LEN, Reply, SettingsOrigin, Status};
+use rowtone_chance::{Chance, XorShiftStar};
 
 /// Any number that may go over a wire, small, large and ordinary ones alike.
 pub fn real() -> impl Strategy<Value = f32> {
@@ -122,35 +123,9 @@ pub fn ordinary_report(seq: u32) -> Report {
     }
 }
 
-/// A small fast generator with a seed (xorshift64*, Vigna 2016), so that faults can be repeated.
-pub struct Dice(u64);
-
-impl Dice {
-    pub fn new(seed: u64) -> Self {
-        Self(seed.max(1))
-    }
-
-    pub fn roll(&mut self) -> u64 {
-        self.0 ^= self.0 >> 12;
-        self.0 ^= self.0 << 25;
-        self.0 ^= self.0 >> 27;
-        self.0.wrapping_mul(0x2545_f491_4f6c_dd1d)
-    }
-
-    /// Evenly from 0 to below `end`.
-    pub fn below(&mut self, end: u64) -> u64 {
-        ((u128::from(self.roll()) * u128::from(end)) >> 64) as u64
-    }
-
-    /// True once in `1/chance` times.
-    pub fn happens(&mut self, chance: f64) -> bool {
-        ((self.roll() >> 11) as f64) < chance * (1_u64 << 53) as f64
-    }
-}
-
 /// Sends bytes over a line on which a byte in `1/rate` is harmed: a bit turned over, the byte
 /// dropped, sent twice, or replaced by any other. Says whether anything happened.
-pub fn harm(dice: &mut Dice, sent: &[u8], rate: f64, received: &mut Vec<u8>) -> bool {
+pub fn harm(dice: &mut XorShiftStar, sent: &[u8], rate: f64, received: &mut Vec<u8>) -> bool {
     let mut harmed = false;
     for &byte in sent {
         if !dice.happens(rate) {

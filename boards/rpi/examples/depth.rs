@@ -10,6 +10,7 @@ use std::f64::consts::TAU;
 
 use rowtone::camera::RawFormat;
 use rowtone::pipeline::Reporter;
+use rowtone_chance::{Chance, XorShift};
 use rowtone_rpi::capture::simulated::{Scene, Simulated};
 use rowtone_rpi::capture::{Facts, Frame, Shape, Source};
 use rowtone_rpi::clock::FrameClock;
@@ -24,24 +25,8 @@ const FRAMES: u32 = 140;
 const PERIOD_NS: i64 = 16_666_667;
 const LINE_TIME_S: f64 = 66e-6;
 
-/// Numbers of a standard normal distribution: xorshift, then Box and Muller.
-struct Normal(u64);
-
-impl Normal {
-    fn uniform(&mut self) -> f64 {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 7;
-        self.0 ^= self.0 << 17;
-        ((self.0 >> 11) as f64 + 0.5) / (1u64 << 53) as f64
-    }
-
-    fn next(&mut self) -> f64 {
-        (-2.0 * self.uniform().ln()).sqrt() * (TAU * self.uniform()).cos()
-    }
-}
-
 /// A frame as the sensor packs it.
-fn draw(scene: &Scene, frame: u32, electrons: f64, light: f64, noise: &mut Normal) -> Vec<u8> {
+fn draw(scene: &Scene, frame: u32, electrons: f64, light: f64, noise: &mut XorShift) -> Vec<u8> {
     let mut bytes = Vec::new();
     for y in 0..HEIGHT {
         let time_s = f64::from(frame) * PERIOD_NS as f64 * 1e-9 + f64::from(y) * LINE_TIME_S;
@@ -54,7 +39,8 @@ fn draw(scene: &Scene, frame: u32, electrons: f64, light: f64, noise: &mut Norma
                 + 0.15 * (TAU * u / 29.3 - 0.31 * row).sin()
                 + 0.1 * (TAU * u / 8.9 + 1.7 * row).cos();
             let mean = electrons * light * shape;
-            let read = mean + mean.max(0.0).sqrt() * noise.next() + 3.0 * noise.next();
+            let read =
+                mean + mean.max(0.0).sqrt() * noise.normal_between() + 3.0 * noise.normal_between();
             *pixel = (64.0 + read / electrons * 959.0).round().clamp(0.0, 1023.0) as u16;
         }
         for group in pixels.chunks_exact(4) {
@@ -111,7 +97,7 @@ fn main() {
         (500.0, 0.9),
         (500.0, 0.1),
     ] {
-        let mut noise = Normal(0x9e37_79b9_7f4a_7c15);
+        let mut noise = XorShift(0x9e37_79b9_7f4a_7c15);
         let frames: Vec<_> = (0..FRAMES)
             .map(|frame| draw(&scene, frame, electrons, light, &mut noise))
             .collect();

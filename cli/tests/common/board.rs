@@ -15,8 +15,8 @@ use std::time::{Duration, Instant};
 use nix::fcntl::{FcntlArg, FdFlag, fcntl};
 use rowtone::link::settings::store::Nowhere;
 use rowtone::report::{Peak, Report};
-use rowtone::wire::Format;
-use rowtone::wire::{Message, text};
+use rowtone::wire::{Format, Message, text};
+use rowtone_chance::{Chance, XorShiftStar};
 use serialport::{SerialPort, TTYPort};
 
 /// Two ends of a pseudo-terminal: the board's, and the host's with its name.
@@ -128,24 +128,18 @@ impl Drop for Board {
     }
 }
 
-fn talk(
-    mut port: TTYPort,
-    shared: &Shared,
-    wire: Format,
-    period: Duration,
-    rate: f64,
-    mut seed: u64,
-) {
+fn talk(mut port: TTYPort, shared: &Shared, wire: Format, period: Duration, rate: f64, seed: u64) {
     let mut slots = [const { None }; 256];
     let mut link = console::link(&mut slots, wire);
     port.set_timeout(Duration::from_millis(2)).unwrap();
     let start = Instant::now();
     let mut bytes = [0; 512];
+    let mut dice = XorShiftStar(seed);
     while !shared.stop.load(Ordering::Relaxed) {
         let now_us = || start.elapsed().as_micros() as u64;
         match port.read(&mut bytes) {
             Ok(n) => {
-                for byte in through_cable(&bytes[..n], shared, rate, &mut seed) {
+                for byte in through_cable(&bytes[..n], shared, rate, &mut dice) {
                     link.receive(byte, now_us(), &mut Nowhere);
                 }
             }
@@ -163,7 +157,7 @@ fn talk(
                 break;
             }
             let len = said.len();
-            let arrives = through_cable(said, shared, rate, &mut seed);
+            let arrives = through_cable(said, shared, rate, &mut dice);
             if !shared.unplugged.load(Ordering::Relaxed) && port.write_all(&arrives).is_err() {
                 break; // full: it says the rest of it again
             }
@@ -173,14 +167,8 @@ fn talk(
 }
 
 /// One byte in `1/rate` has a bit turned, is lost, or comes twice.
-fn through_cable(sent: &[u8], shared: &Shared, rate: f64, seed: &mut u64) -> Vec<u8> {
-    // xorshift64* (Vigna 2016)
-    let mut roll = || {
-        *seed ^= *seed >> 12;
-        *seed ^= *seed << 25;
-        *seed ^= *seed >> 27;
-        seed.wrapping_mul(0x2545_f491_4f6c_dd1d) >> 11
-    };
+fn through_cable(sent: &[u8], shared: &Shared, rate: f64, dice: &mut XorShiftStar) -> Vec<u8> {
+    let mut roll = || dice.next() >> 11;
     let mut received = vec![];
     for &byte in sent {
         if (roll() as f64) >= rate * (1_u64 << 53) as f64 {

@@ -116,11 +116,8 @@ mod tests {
     use super::*;
 
     fn noise(frames: usize, rows: usize, smooth: usize) -> Vec<Vec<f64>> {
-        let mut state = 7u32;
-        let mut uniform = || {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            f64::from(state >> 8) / f64::from(1 << 24) - 0.5
-        };
+        let mut chance = rowtone_chance::Quick(7);
+        let mut uniform = || chance.unit() - 0.5;
         (0..frames)
             .map(|_| {
                 let white: Vec<f64> = (0..rows + smooth).map(|_| uniform()).collect();

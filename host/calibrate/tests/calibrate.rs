@@ -3,6 +3,7 @@
 use rowtone_calibrate::file::RollingName;
 use rowtone_calibrate::rows::Recording;
 use rowtone_calibrate::{Calibration, Light, Refusal, calibrate, stripes};
+use rowtone_chance::{Chance, SplitMix};
 
 /// A camera, a light and a scene; row means with their own noise.
 #[derive(Clone)]
@@ -48,21 +49,6 @@ impl Default for Scene {
     }
 }
 
-/// splitmix64.
-fn random(state: &mut u64) -> u64 {
-    *state = state.wrapping_add(0x9E37_79B9_7F4A_7C15);
-    let mut z = *state;
-    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-    z ^ (z >> 31)
-}
-
-fn gauss(state: &mut u64) -> f64 {
-    let unit = |v: u64| ((v >> 11) as f64 + 0.5) / (1u64 << 53) as f64;
-    let (a, b) = (unit(random(state)), unit(random(state)));
-    (-2.0 * a.ln()).sqrt() * (std::f64::consts::TAU * b).cos()
-}
-
 impl Scene {
     /// Time the light is on between 0 and `t`, s.
     fn lit(&self, t: f64) -> f64 {
@@ -71,13 +57,12 @@ impl Scene {
     }
 
     fn fails(&self, cycle: u64) -> bool {
-        let mut state = cycle.wrapping_mul(7919) ^ self.seed;
-        random(&mut state) % 1000 < self.missing
+        SplitMix(cycle.wrapping_mul(7919) ^ self.seed).next() % 1000 < self.missing
     }
 
     fn recording(&self) -> Recording {
-        let mut state = self.seed;
-        let phase = (random(&mut state) % 1000) as f64 / 1000.0 / self.light_hz;
+        let mut chance = SplitMix(self.seed);
+        let phase = (chance.next() % 1000) as f64 / 1000.0 / self.light_hz;
         let rows = (0..self.frames)
             .map(|n| {
                 (0..self.rows)
@@ -90,8 +75,9 @@ impl Scene {
                             light = 0.0;
                         }
                         let gain = 1.0 + (self.gradient - 1.0) * y as f64 / self.rows as f64;
-                        let value =
-                            self.ambient + 180.0 * gain * light + self.noise * gauss(&mut state);
+                        let value = self.ambient
+                            + 180.0 * gain * light
+                            + self.noise * chance.normal_between();
                         value.clamp(0.0, self.ceiling)
                     })
                     .collect()

@@ -1,5 +1,6 @@
 //! The camera's pins in time: D0.., PCLK, HREF and VSYNC, with the jitter and the faults of a real one.
 
+use rowtone_chance::{Chance, SplitMix};
 use rowtone_pico2::capture::{HREF, PCLK};
 use rowtone_pico2::hm01b0::{Bus, ROWS, WIDTH};
 
@@ -8,21 +9,9 @@ pub(crate) const VSYNC: u8 = 10;
 /// Time of one cycle of the state machine at 150 MHz, ns.
 pub(crate) const CYCLE_NS: f64 = 1000.0 / 150.0;
 
-/// A small random number generator (SplitMix64), so that a run can be repeated.
-pub(crate) struct Random(pub u64);
-
-impl Random {
-    pub(crate) fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let z = (self.0 ^ self.0 >> 30).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        let z = (z ^ z >> 27).wrapping_mul(0x94D0_49BB_1331_11EB);
-        z ^ z >> 31
-    }
-
-    /// Evenly from −1 to 1.
-    pub(crate) fn sign_unit(&mut self) -> f64 {
-        (self.next() >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-    }
+/// Evenly from −1 to 1.
+fn sign_unit(random: &mut SplitMix) -> f64 {
+    2.0 * random.unit() - 1.0
 }
 
 /// What happens to one row.
@@ -48,7 +37,7 @@ pub(crate) struct Camera {
     pub(crate) skew_ns: f64,
     pub(crate) rows: u16,
     pub(crate) fault: Option<Fault>,
-    pub(crate) random: Random,
+    pub(crate) random: SplitMix,
 }
 
 impl Camera {
@@ -62,14 +51,14 @@ impl Camera {
             skew_ns: 0.0,
             rows: ROWS,
             fault: None,
-            random: Random(1),
+            random: SplitMix(1),
         }
     }
 
     /// The pixel that the camera sees at this place.
     pub(crate) fn pixel(frame: u32, row: u16, column: u16) -> u8 {
         let place = u64::from(frame) << 32 | u64::from(row) << 16 | u64::from(column);
-        Random(place).next() as u8
+        SplitMix(place).next() as u8
     }
 
     /// One frame: VSYNC rises two lines before the first row and falls after the last.
@@ -127,13 +116,14 @@ impl Camera {
     /// The clock falls, data and HREF change, the clock rises.
     fn clock(&mut self, pins: &mut Pins, data: u32, href: bool) {
         let period = 1e9 / self.pclk_hz;
-        let skew = self.skew_ns * self.random.sign_unit();
+        let skew = self.skew_ns * sign_unit(&mut self.random);
         pins.set(PCLK, false, 0.0);
         pins.set_data(data, self.bus.bits(), skew);
-        pins.set(HREF, href, self.skew_ns * self.random.sign_unit());
-        pins.now_ns += period * (1.0 - self.duty) * (1.0 + self.jitter * self.random.sign_unit());
+        pins.set(HREF, href, self.skew_ns * sign_unit(&mut self.random));
+        pins.now_ns +=
+            period * (1.0 - self.duty) * (1.0 + self.jitter * sign_unit(&mut self.random));
         pins.set(PCLK, true, 0.0);
-        pins.now_ns += period * self.duty * (1.0 + self.jitter * self.random.sign_unit());
+        pins.now_ns += period * self.duty * (1.0 + self.jitter * sign_unit(&mut self.random));
     }
 }
 

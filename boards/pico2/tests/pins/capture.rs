@@ -1,6 +1,8 @@
 //! The PIO program, executed against a camera's pins.
 
-use crate::camera::{Camera, Fault, Random};
+use rowtone_chance::SplitMix;
+
+use crate::camera::{Camera, Fault};
 use crate::machine::Machine;
 use rowtone_pico2::capture::{
     HREF, LINE_PIXELS, LINE_WORDS, missing_samples, program, samples_less_one,
@@ -36,7 +38,7 @@ fn truth(frame: u32, row: usize) -> Vec<u8> {
 fn camera(bus: Bus, pclk_hz: f64, seed: u64) -> Camera {
     let mut camera = Camera::new(bus, pclk_hz);
     camera.rows = 6;
-    camera.random = Random(seed);
+    camera.random = SplitMix(seed);
     camera
 }
 

@@ -141,13 +141,8 @@ pub(super) mod tests {
 
     /// White noise, the same every time.
     pub(crate) fn noise(count: usize) -> Vec<f64> {
-        let mut state = 1u32;
-        (0..count)
-            .map(|_| {
-                state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-                f64::from(state >> 8) / f64::from(1 << 24)
-            })
-            .collect()
+        let mut chance = rowtone_chance::Quick(1);
+        (0..count).map(|_| chance.unit()).collect()
     }
 
     /// A wave of so many periods across and down.

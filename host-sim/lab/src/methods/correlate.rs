@@ -108,13 +108,8 @@ mod tests {
     use super::*;
 
     fn noise(size: usize) -> Vec<f64> {
-        let mut state = 5u32;
-        (0..size)
-            .map(|_| {
-                state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-                f64::from(state >> 8) / f64::from(1 << 24) - 0.5
-            })
-            .collect()
+        let mut chance = rowtone_chance::Quick(5);
+        (0..size).map(|_| chance.unit() - 0.5).collect()
     }
 
     /// The shift of Fig. 5.8.

@@ -193,6 +193,8 @@ fn orthonormal(mut shapes: [Vec<f32>; KNOWN]) -> [Vec<f32>; KNOWN] {
 
 #[cfg(test)]
 mod tests {
+    use rowtone_chance::{Chance, XorShift};
+
     use super::*;
 
     /// A picture in memory.
@@ -210,21 +212,18 @@ mod tests {
         }
     }
 
-    /// Noise of some four grey levels, from Marsaglia's xorshift.
-    fn noise(state: &mut u64) -> f32 {
+    /// Noise of some four grey levels.
+    fn noise(chance: &mut XorShift) -> f32 {
         let mut sum = 0.0;
         for _ in 0..4 {
-            *state ^= *state << 13;
-            *state ^= *state >> 7;
-            *state ^= *state << 17;
-            sum += (*state >> 40) as f32 / (1 << 24) as f32 - 0.5;
+            sum += (chance.next() >> 40) as f32 / (1 << 24) as f32 - 0.5;
         }
         7.0 * sum
     }
 
     /// Thirty frames of a texture that moves; of a frame's noise, `kept` is that of the frame before.
     fn clip(seed: u64, kept: f32) -> Vec<Still> {
-        let mut state = seed;
+        let mut chance = XorShift(seed);
         let mut grain = vec![0.0_f32; 64 * 48];
         let fresh = (1.0 - kept * kept).sqrt();
         (0..30)
@@ -233,7 +232,7 @@ mod tests {
                 let light = 1.0 + 0.02 * (frame as f32 * 0.7).cos();
                 grain
                     .iter_mut()
-                    .for_each(|g| *g = kept * *g + fresh * noise(&mut state));
+                    .for_each(|g| *g = kept * *g + fresh * noise(&mut chance));
                 let pixels = grain.iter().enumerate().map(|(k, grain)| {
                     let (x, y) = ((k % 64) as f32 - shift, (k / 64) as f32);
                     let texture =
