@@ -212,7 +212,7 @@ impl Kernel {
     /// [`Kernel::sums_u8`], and Σ h'·p with a second row of coefficients: the pixels are loaded once. The shortest length of the
     /// three counts.
     #[inline(always)]
-    pub fn both_u8(self, pixels: &[u8], coefficients: &[i8], second: &[i8]) -> (Sums, i64) {
+    pub(crate) fn both_u8(self, pixels: &[u8], coefficients: &[i8], second: &[i8]) -> (Sums, i64) {
         let n = pixels.len().min(coefficients.len()).min(second.len());
         let (pixels, coefficients, second) = (&pixels[..n], &coefficients[..n], &second[..n]);
         match self.0 {

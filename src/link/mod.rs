@@ -20,7 +20,7 @@ use settings::store::{Keep, SaveError};
 use settings::{Console, Settings, SettingsError};
 
 /// Most answers that can wait for the line. A command that comes while so many wait is refused.
-pub const MAX_ANSWERS: usize = 2;
+pub(crate) const MAX_ANSWERS: usize = 2;
 
 /// How late the echo of a Modbus response may come behind it, µs: adapters hold bytes back for some
 /// milliseconds.

@@ -146,7 +146,7 @@ impl<'a> Outbox<'a> {
 
     /// Takes nothing as waiting any more, without dropping it: for a line on which reports are read when
     /// the host likes. They are kept, and can be asked for by number.
-    pub fn pass_over(&mut self) {
+    pub(crate) fn pass_over(&mut self) {
         self.unsent = 0;
     }
 

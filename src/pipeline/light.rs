@@ -20,7 +20,7 @@ pub struct Light {
 
 impl Light {
     /// Before anything was seen: neither dark nor saturated.
-    pub const UNSEEN: Self = Self {
+    pub(crate) const UNSEEN: Self = Self {
         mean: 0.5,
         saturated: 0.0,
     };

@@ -2,7 +2,6 @@
 
 use super::{Light, Reading};
 use crate::camera::Line;
-use crate::report::Warning;
 use crate::timeline::{Binner, Displacement, Group, Sample, Tally};
 use crate::tracker::{Config, ConfigError, Counts, Outcome, Storage, Tracker};
 
@@ -117,12 +116,6 @@ impl<'a> LineSide<'a> {
         let lost = u16::from(reading.sample.is_some());
         self.tally.add(&reading.tally);
         self.tally.dropped_samples = self.tally.dropped_samples.saturating_add(lost);
-        self.tally_waits = true;
-    }
-
-    /// The source of the lines has something to warn of in the present frame.
-    pub fn warn(&mut self, warning: Warning) {
-        self.tally.notes.insert(warning);
         self.tally_waits = true;
     }
 

@@ -115,7 +115,7 @@ impl Warning {
 /// assert!(warnings.names().eq(["lost_frames", "occluded"]));
 /// ```
 ///
-/// As a field of a serialised report it is the set's [`Warnings::lower_bits`]: wires of version 1 have 16 bits.
+/// As a field of a serialised report it is the set's lower 16 bits: wires of version 1 have no more.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(into = "u16", from = "u16")]
 pub struct Warnings(u32);
@@ -145,7 +145,7 @@ impl Warnings {
     }
 
     /// The first sixteen bits: all that wires of version 1 carry.
-    pub const fn lower_bits(self) -> u16 {
+    pub(crate) const fn lower_bits(self) -> u16 {
         self.0 as u16
     }
 

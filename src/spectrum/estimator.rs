@@ -92,7 +92,7 @@ impl<'a> Estimator<'a> {
     }
 
     /// Frames a window may have.
-    pub fn frame_capacity(&self) -> usize {
+    pub(crate) fn frame_capacity(&self) -> usize {
         let s = &self.storage;
         s.samples
             .frame_capacity(usize::from(self.group.slots()))

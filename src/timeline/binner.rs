@@ -146,7 +146,7 @@ impl Binner {
 
     /// What the tracker says of the rows to come ([`Tracker::curvature`](crate::tracker::Tracker::curvature)).
     /// [`Tracker::push_into`](crate::tracker::Tracker::push_into) does it itself.
-    pub fn set_curvature(&mut self, curvature: Curvature) {
+    pub(crate) fn set_curvature(&mut self, curvature: Curvature) {
         self.curvature = curvature;
     }
 
@@ -424,7 +424,7 @@ impl Binner {
     }
 
     /// Groups given up so far because less than half of their rows could be measured.
-    pub const fn thin_groups(&self) -> u32 {
+    pub(crate) const fn thin_groups(&self) -> u32 {
         self.thin_groups
     }
 

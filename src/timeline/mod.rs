@@ -126,7 +126,7 @@ impl Curvature {
     }
 
     /// In 1/px², 0 to 9.8.
-    pub fn per_px2(self) -> f32 {
+    pub(crate) fn per_px2(self) -> f32 {
         f32::from_bits(u32::from(self.0) << 16)
     }
 }

@@ -51,7 +51,7 @@ impl Format {
     }
 
     /// Whether this build speaks it (features `binary` and `modbus`).
-    pub const fn is_built_in(self) -> bool {
+    pub(crate) const fn is_built_in(self) -> bool {
         match self {
             Self::Text => true,
             Self::Binary => cfg!(feature = "binary"),

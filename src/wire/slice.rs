@@ -21,7 +21,7 @@ impl<'a> SliceWriter<'a> {
     }
 
     /// What was written, for as long as the slice was lent.
-    pub fn into_written(self) -> &'a [u8] {
+    pub(crate) fn into_written(self) -> &'a [u8] {
         self.buffer.get(..self.used).unwrap_or_default()
     }
 }

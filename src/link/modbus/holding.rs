@@ -6,15 +6,15 @@ use crate::wire::Format;
 use crate::wire::modbus::half;
 
 /// How many there are.
-pub const HOLDING_LEN: u16 = 20;
+pub(crate) const HOLDING_LEN: u16 = 20;
 
 /// Address of the register that takes commands: 1 saves the settings, 2 goes back to the defaults.
 /// It reads as 0.
-pub const COMMAND_AT: u16 = 7;
+pub(crate) const COMMAND_AT: u16 = 7;
 
 /// Address of the lock, two registers: a number written there locks the settings, or unlocks them
 /// where it locked them. It reads as 1 where they are locked, else as 0.
-pub const LOCK_AT: u16 = 30;
+pub(crate) const LOCK_AT: u16 = 30;
 
 /// All holding registers at once: changed here, and only then made settings again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

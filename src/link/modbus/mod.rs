@@ -1,10 +1,9 @@
 //! A board as a Modbus RTU server: the settings as its holding registers, and its answers.
 //!
 //! A PLC reads what was measured from the input registers ([`crate::wire::modbus::State`]) and reads and
-//! writes the settings in the holding registers ([`HOLDING_LEN`] of them).
+//! writes the settings in the holding registers.
 
 mod holding;
 mod server;
 
-pub use holding::{COMMAND_AT, HOLDING_LEN, LOCK_AT};
 pub use server::{Exception, answer};

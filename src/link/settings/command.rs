@@ -125,7 +125,7 @@ impl<'a> Changes<'a> {
     ///
     /// # Errors
     /// An unknown setting, or a value that it cannot read.
-    pub fn apply(self, settings: &Settings) -> Result<Settings, CommandError<'a>> {
+    pub(crate) fn apply(self, settings: &Settings) -> Result<Settings, CommandError<'a>> {
         let mut changed = *settings;
         let mut words = self.0.split_ascii_whitespace();
         while let Some(word) = words.next() {

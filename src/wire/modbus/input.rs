@@ -12,10 +12,10 @@ use super::half;
 const MAP: u16 = 1;
 
 /// Address of the first peak.
-pub const PEAKS_AT: u16 = 100;
+pub(crate) const PEAKS_AT: u16 = 100;
 
 /// Registers from one peak to the next.
-pub const PEAK_STRIDE: u16 = 20;
+pub(crate) const PEAK_STRIDE: u16 = 20;
 
 /// Address of the CRC-32 of the report.
 ///

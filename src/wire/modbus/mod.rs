@@ -14,7 +14,7 @@
 mod input;
 mod rtu;
 
-pub use input::{PEAK_STRIDE, PEAKS_AT, State, decode_report};
+pub use input::{State, decode_report};
 pub use rtu::FrameReader;
 
 /// Longest RTU frame, bytes.
