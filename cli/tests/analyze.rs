@@ -2,11 +2,12 @@
 
 mod common;
 
-use std::io::{Read, Write};
+use std::io::Read;
 use std::process::{Command, Stdio};
 
 use common::{
-    CAMERA, assert_failure, assert_the_tone, command, config, file, on_clip, reports, texts, y4m,
+    CAMERA, assert_failure, assert_the_tone, command, config, file, on_clip, piped, reports, texts,
+    y4m,
 };
 
 #[test]
@@ -34,14 +35,9 @@ fn a_clip_gives_its_tone_once_a_window() {
 fn standard_input_and_deep_pixels_are_read_as_well() {
     let mut deep = config(60);
     deep.sensor.bits = 10;
-    let mut child = command(["analyze", "-", "--format", "json"].iter().chain(&CAMERA))
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .spawn()
-        .unwrap();
-    child.stdin.take().unwrap().write_all(&y4m(deep)).unwrap();
-    let (stdout, _) = texts(&child.wait_with_output().unwrap());
-    assert_the_tone(&reports(&stdout)[0]);
+    let args = ["analyze", "-", "--format", "json"];
+    let output = piped(args.iter().chain(&CAMERA), &y4m(deep));
+    assert_the_tone(&reports(&texts(&output).0)[0]);
 }
 
 #[test]
@@ -159,18 +155,7 @@ fn wire_sentences_are_what_monitor_reads() {
     let output = on_clip("analyze", &clip, &["--format", "wire"]);
     assert!(output.stdout.starts_with(b"$RTRPT,"));
     assert!(output.stdout.ends_with(b"\r\n"));
-    let mut child = command(["monitor", "-", "--format", "json"])
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .spawn()
-        .unwrap();
-    child
-        .stdin
-        .take()
-        .unwrap()
-        .write_all(&output.stdout)
-        .unwrap();
-    let heard = child.wait_with_output().unwrap();
+    let heard = piped(["monitor", "-", "--format", "json"], &output.stdout);
     assert_the_tone(&reports(&texts(&heard).0)[0]);
 }
 

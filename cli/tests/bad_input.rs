@@ -2,10 +2,7 @@
 
 mod common;
 
-use std::io::Write;
-use std::process::Stdio;
-
-use common::{CAMERA, assert_failure, command, config, file, on_clip, reports, texts, y4m};
+use common::{CAMERA, assert_failure, command, config, file, on_clip, piped, reports, texts, y4m};
 
 #[test]
 fn files_that_are_no_clip() {
@@ -115,15 +112,8 @@ fn what_was_measured_before_the_times_end_comes_out() {
         "--pts",
         pts.to_str().unwrap(),
     ];
-    let mut child = command(args.iter().chain(&CAMERA))
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
     // The command stops reading at the frame without a time.
-    let _ = child.stdin.take().unwrap().write_all(&y4m(config(80)));
-    let output = child.wait_with_output().unwrap();
+    let output = piped(args.iter().chain(&CAMERA), &y4m(config(80)));
     assert_failure(&output, 1, &["only 60 times", "at least 61"]);
     common::assert_the_tone(&reports(&texts(&output).0)[0]);
 }
@@ -240,19 +230,7 @@ fn more_times_than_frames_of_a_pipe() {
         "--pts",
         pts.to_str().unwrap(),
     ];
-    let mut child = command(args.iter().chain(&CAMERA))
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
-    child
-        .stdin
-        .take()
-        .unwrap()
-        .write_all(&y4m(config(60)))
-        .unwrap();
-    let output = child.wait_with_output().unwrap();
+    let output = piped(args.iter().chain(&CAMERA), &y4m(config(60)));
     assert_failure(&output, 1, &["65 times", "60 frames"]);
     common::assert_the_tone(&reports(&texts(&output).0)[0]);
 }

@@ -1,6 +1,7 @@
 //! What the tests of the command share: small simulated clips, and running it.
 #![allow(dead_code, reason = "every test file uses some of it, none uses all")]
 
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
@@ -60,6 +61,22 @@ pub(crate) fn on_clip(verb: &str, path: &Path, more: &[&str]) -> Output {
     command(args.chain(more.iter().copied()))
         .output()
         .expect("the command runs")
+}
+
+/// Runs the command with `input` on its standard input, as far as it reads that.
+pub(crate) fn piped<S: AsRef<std::ffi::OsStr>>(
+    args: impl IntoIterator<Item = S>,
+    input: &[u8],
+) -> Output {
+    let mut child = command(args)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the command starts");
+    // A command that has seen enough stops reading.
+    let _ = child.stdin.take().expect("a pipe").write_all(input);
+    child.wait_with_output().expect("the command ends")
 }
 
 /// Standard output and error as text.

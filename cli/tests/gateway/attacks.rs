@@ -10,7 +10,8 @@ use std::time::{Duration, Instant};
 use crate::board::{line, pair};
 use crate::broker::{Broker, publish_with, subscribe};
 use crate::{
-    JSON, board_and_number, collect, config, dir, ports, rowtone, run, run_logged, wait_for,
+    JSON, assert_all, board_and_number, collect, config, dir, ports, rowtone, run, run_logged,
+    wait_for,
 };
 
 const SPARKPLUG: &str = "format = \"sparkplug\"\ngroup = \"g\"\nnode = \"n\"";
@@ -284,11 +285,7 @@ fn what_check_refuses() {
 fn a_gateway_that_is_killed_sixty_times_loses_nothing() {
     const KILLS: u32 = 60;
     let dir = dir("sixty");
-    let lasting = format!(
-        "allow_anonymous true\npersistence true\npersistence_location {}/",
-        dir.display()
-    );
-    let Some(mut broker) = Broker::start(&dir, &lasting) else {
+    let Some(mut broker) = Broker::lasting(&dir) else {
         return;
     };
     let (_client, heard) = subscribe(broker.port, "plant/+/report");
@@ -328,13 +325,7 @@ fn a_gateway_that_is_killed_sixty_times_loses_nothing() {
         drop(gateway);
     }
     let _gateway = run(&config, &[]);
-    let (numbers, again) = collect(&heard, 3, seq as usize);
-    for (board, numbers) in &numbers {
-        assert!(
-            numbers.iter().copied().eq(0..u64::from(seq)),
-            "{board}: {numbers:?}"
-        );
-    }
+    let again = assert_all(&heard, 3, seq);
     println!("{seq} reports of 3 boards, {KILLS} kills, {again} came again");
     drop(broker);
     std::fs::remove_dir_all(dir).unwrap();

@@ -43,6 +43,15 @@ impl Broker {
         broker.go().then_some(broker)
     }
 
+    /// Starts one that keeps what it has on disk.
+    pub(crate) fn lasting(dir: &Path) -> Option<Self> {
+        let more = format!(
+            "allow_anonymous true\npersistence true\npersistence_location {}/",
+            dir.display()
+        );
+        Self::start(dir, &more)
+    }
+
     pub(crate) fn go(&mut self) -> bool {
         // Debian keeps it where only root looks.
         for program in ["mosquitto", "/usr/sbin/mosquitto"] {

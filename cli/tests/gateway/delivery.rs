@@ -9,7 +9,7 @@ use serialport::TTYPort;
 
 use crate::board::{Board, line};
 use crate::broker::{Broker, subscribe};
-use crate::{JSON, board_and_number, collect, config, dir, ports, run};
+use crate::{JSON, assert_all, board_and_number, config, dir, ports, run};
 
 /// Every board says these reports, so far apart.
 fn say(ports: &mut [TTYPort], numbers: std::ops::Range<u32>, period: Duration) {
@@ -26,11 +26,7 @@ fn say(ports: &mut [TTYPort], numbers: std::ops::Range<u32>, period: Duration) {
 fn nothing_is_lost_while_the_broker_or_the_gateway_is_away() {
     const PERIOD: Duration = Duration::from_millis(20);
     let dir = dir("away");
-    let lasting = format!(
-        "allow_anonymous true\npersistence true\npersistence_location {}/",
-        dir.display()
-    );
-    let Some(mut broker) = Broker::start(&dir, &lasting) else {
+    let Some(mut broker) = Broker::lasting(&dir) else {
         return;
     };
     let (_client, heard) = subscribe(broker.port, "plant/+/report");
@@ -48,10 +44,7 @@ fn nothing_is_lost_while_the_broker_or_the_gateway_is_away() {
     say(&mut ports, 40..60, PERIOD);
     assert!(broker.go());
     say(&mut ports, 60..80, PERIOD);
-    let (numbers, again) = collect(&heard, 3, 80);
-    for (board, numbers) in &numbers {
-        assert!(numbers.iter().copied().eq(0..80), "{board}: {numbers:?}");
-    }
+    let again = assert_all(&heard, 3, 80);
     println!("80 reports of 3 boards, {again} came again");
     drop((gateway, broker));
     std::fs::remove_dir_all(dir).unwrap();
@@ -95,11 +88,7 @@ fn kills(name: &str, kills: u32) {
             std::thread::sleep(rest);
         }
     }
-    let (numbers, again) = collect(&heard, 3, count as usize);
-    for (board, numbers) in &numbers {
-        let expected = 0..u64::from(count);
-        assert!(numbers.iter().copied().eq(expected), "{board}: {numbers:?}");
-    }
+    let again = assert_all(&heard, 3, count);
     println!("{count} reports of 3 boards, {kills} kills, {again} came again");
     let _ports = talk.join().unwrap();
     drop((gateway, broker));

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use crate::board::line;
 use crate::broker::{Broker, subscribe};
-use crate::{JSON, collect, config, dir, ports, run};
+use crate::{JSON, assert_all, config, dir, ports, run};
 
 /// What a process used of processor and memory so far.
 struct Use {
@@ -66,14 +66,10 @@ fn two_hundred_boards() {
         }
         (ports, late)
     });
-    let (numbers, again) = collect(&heard, BOARDS, REPORTS as usize);
+    let again = assert_all(&heard, BOARDS, REPORTS);
     let seconds = start.elapsed().as_secs_f64();
     let after = pids.map(Use::of);
     let (_ports, late) = talk.join().unwrap();
-    for (board, numbers) in &numbers {
-        let expected = 0..u64::from(REPORTS);
-        assert!(numbers.iter().copied().eq(expected), "{board}: {numbers:?}");
-    }
     println!(
         "{BOARDS} boards, {} reports in {seconds:.1} s, none lost, in order, {again} came again \
          (the boards were late by up to {:.0} ms)",

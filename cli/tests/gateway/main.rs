@@ -107,6 +107,17 @@ fn collect(
     (numbers, again)
 }
 
+/// Asserts that every report from 0 to `count` came from each of these boards, in order. How many came
+/// again.
+fn assert_all(heard: &Receiver<(String, Vec<u8>)>, boards: usize, count: u32) -> u32 {
+    let (numbers, again) = collect(heard, boards, count as usize);
+    for (board, numbers) in &numbers {
+        let expected = 0..u64::from(count);
+        assert!(numbers.iter().copied().eq(expected), "{board}: {numbers:?}");
+    }
+    again
+}
+
 fn run(config: &Path, more: &[&str]) -> Gateway {
     run_into(config, more, Stdio::null())
 }
