@@ -137,6 +137,7 @@ def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("--rowtone", default="target/release/rowtone")
     parser.add_argument("--shots", metavar="FOLDER")
+    parser.add_argument("--whole", metavar="FILE.png", help="all of the page, scrolled or not")
     parser.add_argument("--dark", action="store_true", help="as for those who prefer it dark")
     args = parser.parse_args()
     ended = "typeof DATA !== 'undefined' && DATA.state?.phase === 'ended' && document.body.dataset.peaks"
@@ -161,6 +162,10 @@ def main():
                 check(f"{chart} is drawn", colours > 3, colours)
             if args.shots:
                 browser.shot(f"{args.shots}/page-1280x800.png")
+            if args.whole:
+                browser.call("Emulation.setDeviceMetricsOverride", width=1280, height=1700, deviceScaleFactor=1, mobile=False)
+                browser.shot(args.whole)
+                browser.call("Emulation.setDeviceMetricsOverride", width=1280, height=800, deviceScaleFactor=1, mobile=False)
             wide = browser.value("document.documentElement.scrollWidth")
             check("nothing sticks out at 1280 px", wide <= 1280, wide)
 
@@ -208,6 +213,15 @@ def main():
             browser.wait(ended, "the tones without events")
             tones(browser, "without events")
             check("no error on the console", not browser.errors and not browser.network, browser.errors, browser.network)
+
+            # The page as one file, with what was measured in it.
+            still = f"{folder}/press.html"
+            subprocess.run([args.rowtone, "analyze", clip, *CAMERA, "--report", still], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+            browser.open(f"file://{still}", 1280, 800)
+            browser.wait(ended, "the tones of the file")
+            browser.wait("!!PICTURE.bitmap", "the picture of the file")
+            tones(browser, "the file")
+            check("the file asks for nothing", not browser.network and not browser.errors, browser.errors, browser.network)
 
             # With a password: the first change sets it.
             page.terminate(), page.wait(20)

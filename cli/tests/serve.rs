@@ -199,3 +199,40 @@ fn it_ends_in_order_when_asked_and_with_status_1_for_what_is_no_video() {
     assert_eq!(refused.status.code(), Some(1));
     assert!(String::from_utf8_lossy(&refused.stderr).starts_with("rowtone: /nowhere.y4m: "));
 }
+
+/// `analyze --report`: the same page as one file, with the reports in it.
+#[test]
+fn a_still_page_holds_what_analyze_printed() {
+    let path = clip("still");
+    let page = path.replace(".y4m", ".html");
+    let analyzed = Command::new(env!("CARGO_BIN_EXE_rowtone"))
+        .args(["analyze", &path, "--format", "json", "--report", &page])
+        .args(CAMERA)
+        .output()
+        .expect("it runs");
+    assert!(analyzed.status.success());
+    let html = std::fs::read_to_string(&page).expect("the page");
+    let from = html.find("const STILL = ").expect("what was measured") + 14;
+    let end = html[from..].find(";\n").expect("its end");
+    let all: Value = serde_json::from_str(&html[from..from + end]).expect("JSON");
+    let printed: Vec<Value> = String::from_utf8(analyzed.stdout)
+        .expect("text")
+        .lines()
+        .map(|line| serde_json::from_str(line).expect("JSON"))
+        .collect();
+    assert_eq!(all["reports"], Value::from(printed));
+    assert!(
+        all["picture"]
+            .as_str()
+            .is_some_and(|p| p.starts_with("data:image/jpeg;base64,/9j/"))
+    );
+    let refused = Command::new(env!("CARGO_BIN_EXE_rowtone"))
+        .args(["analyze", &path, "--report", "page.pdf"])
+        .args(CAMERA)
+        .output()
+        .expect("it runs");
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&refused.stderr).contains("ends with .html"));
+    std::fs::remove_file(&path).expect("it is there");
+    std::fs::remove_file(&page).expect("it is there");
+}

@@ -12,6 +12,7 @@ use super::window::WindowArgs;
 use crate::camera_args::CameraArgs;
 use crate::failure::Failure;
 use crate::output::Out;
+use crate::output::page::StillPage;
 use crate::output::progress::Progress;
 use rowtone_clip::Feed;
 use rowtone_files::WholeFile;
@@ -47,6 +48,9 @@ pub struct Args {
     /// Also draws spectrum, displacement and spectrogram
     #[arg(long, value_name = "FILE.svg|.png")]
     plot: Option<PathBuf>,
+    /// Also writes the page of `rowtone serve` as one still file to hand on
+    #[arg(long, value_name = "FILE.html")]
+    report: Option<PathBuf>,
 }
 
 /// Formats of the reports.
@@ -68,6 +72,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         rowtone_plot::check_ending(path)?;
         WholeFile::check(path).map_err(|e| Failure::writing(&path.display().to_string(), &e))?;
     }
+    args.report.as_deref().map_or(Ok(()), StillPage::check)?;
     let options = args.camera.options();
     let session = session();
     let serial = args.serial.as_ref().map(|port| {
@@ -83,6 +88,9 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let serial = serial.transpose()?;
     let mut feed = Feed::open(&options)?;
     feed.stop_when(crate::stop::on_signals());
+    let settings = args.window.as_a_board_says(args.camera.um_per_px);
+    let report = args.report.clone();
+    let page = report.map(|path| StillPage::new(path, &mut feed, settings));
     let plan = Plan::new(&feed.camera, &args.window.settings(args.camera.um_per_px))?;
     let shifts = Shifts::start(feed, Some(plan.groups()))?;
     let picture = args.plot.clone().map(|path| {
@@ -110,6 +118,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         out: Out::default(),
         serial,
         picture,
+        page,
         session,
         reports: 0,
     };
@@ -165,12 +174,16 @@ struct Outlets {
     out: Out,
     serial: Option<Sender>,
     picture: Option<Picture>,
+    page: Option<StillPage>,
     session: u32,
     reports: u64,
 }
 
 impl Outlets {
     fn hear(&mut self, event: Event<'_>) -> Result<(), Failure> {
+        if let Some(page) = &mut self.page {
+            page.shown().hear(&event);
+        }
         match event {
             Event::Part(part) => self.place.roi = [part.x, part.y, part.width, part.height],
             Event::Note(note) => self.progress.note(&format!("{}: {note}", self.name)),
@@ -195,6 +208,11 @@ impl Outlets {
         self.reports += 1;
         if let Some(picture) = &mut self.picture {
             picture.report(report);
+        }
+        if let Some(page) = &mut self.page {
+            let limits = self.zone_limits.as_ref();
+            let json = json::measured(report, shapes, self.place, limits);
+            page.shown().report(report, json);
         }
         let sentence = if self.serial.is_some() || self.format == Format::Wire {
             self.sentence(report)
@@ -241,11 +259,13 @@ impl Outlets {
         }
     }
 
-    /// Writes the picture and waits for the serial port.
+    /// Writes the picture and the page, and waits for the serial port.
     fn close(self) -> Result<(), Failure> {
         let drawn = self.picture.map_or(Ok(()), |picture| picture.save());
+        let written = self.page.map_or(Ok(()), StillPage::save);
         let sent = self.serial.map_or(Ok(None), Sender::finish);
         drawn?;
+        written?;
         if let Some(note) = sent? {
             self.progress.note(&note);
         }

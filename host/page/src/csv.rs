@@ -2,15 +2,21 @@
 
 use std::fmt::Write;
 use std::sync::Arc;
+use std::time::{SystemTime, UNIX_EPOCH};
 
 use rowtone_report::{band_velocity, velocity_mm_s_rms};
 
 use crate::reports::Entry;
-use crate::site::unix_s;
 
 /// The heading.
 const HEADING: &str = "unix_s,seq,t_s,window_s,fps,rows,lost_frames,noise_px,velocity_mm_s_rms,warnings,track,hz,hz_sd,\
 amplitude_px,amplitude_px_sd,amplitude_um,peak_velocity_mm_s_rms,snr_db,x_px,x_px_sd,y_px,y_px_sd,harmonic,ambiguous\n";
+
+/// Seconds since 1970.
+pub(crate) fn unix_s(time: SystemTime) -> f64 {
+    time.duration_since(UNIX_EPOCH)
+        .map_or(0.0, |t| t.as_secs_f64())
+}
 
 /// All reports, the oldest first; one without peaks has a line too.
 pub fn text(entries: &[Arc<Entry>]) -> String {

@@ -2,7 +2,8 @@
 //!
 //! - [`live`]: what is shown; whoever measures hands it over ([`reports`], [`frames`], [`motion`]) and never waits;
 //! - [`control`]: what can be changed, by whom ([`password`]);
-//! - [`site`]: which address gives what ([`picture`], [`advice`], [`clip`], [`csv`], [`metrics`]);
+//! - [`site`]: which address gives what ([`picture`], [`advice`], [`clip`], [`csv`], [`metrics`], [`state`]);
+//! - [`still`]: the page as one file to hand on;
 //! - [`server`]: connections, requests and answers ([`http`]), and who is let in ([`guard`]).
 //!
 //! ```
@@ -32,3 +33,5 @@ pub mod picture;
 pub mod reports;
 pub mod server;
 pub mod site;
+pub mod state;
+pub mod still;

@@ -3,7 +3,7 @@
 use std::net::IpAddr;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use std::time::{Duration, Instant};
 
 use serde_json::{Map, Value, json};
 
@@ -14,7 +14,7 @@ use crate::http::request::{Head, Method};
 use crate::live::Live;
 use crate::picture::{Aim, Grey};
 use crate::reports::Entry;
-use crate::{advice, clip, csv, metrics};
+use crate::{clip, csv, metrics, state};
 
 /// The page, all of it: one file that needs nothing else.
 pub const PAGE: &str = concat!(
@@ -42,8 +42,6 @@ const GUESSES: Allowance = Allowance {
 const PICTURE_EVERY: Duration = Duration::from_millis(80);
 /// Reports given at once.
 const AT_ONCE: usize = 600;
-/// Frames of displacement that are shown.
-const CURVE_FRAMES: u32 = 4;
 
 /// A page and all that it shows.
 pub struct Site {
@@ -133,7 +131,7 @@ impl Site {
             "/api/reports.csv" => csv_reply(&self.live.reports.after(0, usize::MAX)),
             "/api/state" => Reply::json(self.state().to_string()),
             "/api/motion" => {
-                let curve = self.live.motion.last(CURVE_FRAMES);
+                let curve = self.live.motion.last(state::CURVE_FRAMES);
                 Reply::json(serde_json::to_vec(&curve).unwrap_or_default())
             }
             "/api/picture.jpg" => match self.shown() {
@@ -196,37 +194,10 @@ impl Site {
 
     /// State, advice, light and focus, counters: what changes from second to second.
     pub fn state(&self) -> Value {
-        let live = &self.live;
-        live.frames.want();
         let shown = self.shown();
         let aim = shown.as_ref().map(|shown| &*shown.aim);
-        let is_live = self.control.is_live();
-        let (state, todo) = advice::state(live, aim, is_live, Instant::now());
-        let last = live.reports.last();
-        let (epoch, id) = live.reports.position();
-        let (kept, missed) = live.frames.counts();
-        json!({
-            "state": state,
-            "advice": todo,
-            "live": is_live,
-            "phase": live.phase().0,
-            "about": live.about(),
-            "version": env!("CARGO_PKG_VERSION"),
-            "age_s": last.as_ref().map(|entry| entry.came.elapsed().as_secs_f64()),
-            "time": unix_s(SystemTime::now()),
-            "up_s": live.began.elapsed().as_secs(),
-            "epoch": epoch,
-            "id": id,
-            "aim": aim,
-            "counters": {
-                "rows": live.lost.rows.load(Ordering::Relaxed),
-                "lost_frames": live.lost.frames.load(Ordering::Relaxed),
-                "dropped_reports": live.lost.reports.load(Ordering::Relaxed),
-                "pictures": kept,
-                "missed_pictures": missed,
-                "refused_requests": self.refused.load(Ordering::Relaxed),
-            },
-        })
+        let refused = self.refused.load(Ordering::Relaxed);
+        state::json(&self.live, aim, self.control.is_live(), refused)
     }
 
     /// The newest picture, made once for all who look.
@@ -407,12 +378,6 @@ impl Site {
 fn csv_reply(entries: &[Arc<Entry>]) -> Reply {
     Reply::new(200, "text/csv; charset=utf-8", csv::text(entries))
         .with("Content-Disposition: attachment; filename=rowtone.csv")
-}
-
-/// Seconds since 1970.
-pub(crate) fn unix_s(time: SystemTime) -> f64 {
-    time.duration_since(UNIX_EPOCH)
-        .map_or(0.0, |t| t.as_secs_f64())
 }
 
 /// A tone in a square.

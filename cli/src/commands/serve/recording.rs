@@ -6,17 +6,15 @@ use std::sync::{Arc, Mutex, PoisonError};
 use super::{ASKED_EVERY, Args, open};
 use crate::commands::analyze::axes_name;
 use crate::failure::Failure;
+use crate::output::page::{Shown, given_size};
 use crate::output::progress::Progress;
-use rowtone::camera::RawFormat;
 use rowtone::link::settings::{Key, Limits, Region, Settings};
-use rowtone_clip::{Camera, CameraOptions, Feed, Frame, Rect, Roi};
+use rowtone_clip::{Camera, CameraOptions, Feed, Rect, Roi};
 use rowtone_measure::MeasureError;
 use rowtone_measure::analysis::{Analysis, Event, Plan, Settings as Wanted};
 use rowtone_measure::tracking::Shifts;
 use rowtone_page::control::Control;
-use rowtone_page::frames::Layout;
-use rowtone_page::live::{About, Live, Phase};
-use rowtone_page::motion::MotionWriter;
+use rowtone_page::live::{Live, Phase};
 use rowtone_report::json::{self, Place};
 
 /// Narrowest part that can be measured, px, and the longest window, s.
@@ -187,11 +185,6 @@ fn desk(args: &Args, camera: Option<&Camera>, interrupt: &Arc<AtomicBool>) -> De
     }
 }
 
-/// Columns and rows of the picture as it was given, before it is turned.
-fn given_size(camera: &Camera) -> (usize, usize) {
-    camera.turn.back().size(camera.size.0, camera.size.1)
-}
-
 /// Measures it once, from its first frame to its last or until it is interrupted. `feed`: where it is open already.
 fn measure(desk: &Desk, live: &Arc<Live>, feed: Option<Feed>) -> Result<(), Failure> {
     let settings = *desk.lock();
@@ -201,17 +194,7 @@ fn measure(desk: &Desk, live: &Arc<Live>, feed: Option<Feed>) -> Result<(), Fail
     };
     feed.stop_when(Arc::clone(&desk.interrupt));
     let camera = feed.camera.clone();
-    let (width, height) = given_size(&camera);
-    live.describe(About {
-        name: feed.name.clone(),
-        picture: Some([width, height]),
-        part: None,
-        line_time_us: Some(camera.timing.line_time_ps() as f64 * 1e-6),
-        exposure_us: Some(f64::from(camera.timing.exposure_ns()) * 1e-3).filter(|&us| us > 0.0),
-        fps: Some(camera.fps),
-    });
-    let show = pictures(live, width, height, camera.bits);
-    feed.show_to(show);
+    let mut shown = Shown::new(&mut feed, live);
     let plan = Plan::new(&camera, &wanted(&settings))?;
     let shifts = Shifts::start(feed, Some(plan.groups()))?;
     let given = camera
@@ -225,31 +208,20 @@ fn measure(desk: &Desk, live: &Arc<Live>, feed: Option<Feed>) -> Result<(), Fail
     let progress = Progress::new(shifts.frames);
     let mut memory = plan.memory();
     let mut analysis = Analysis::new(shifts, &plan, &mut memory)?;
-    let mut motion = MotionWriter::default();
-    live.set_phase(Phase::Measuring, "");
     let outcome = analysis.run(|event| {
+        shown.hear(&event);
         match event {
-            Event::Part(part) => {
-                place.roi = [part.x, part.y, part.width, part.height];
-                live.set_part(place.roi);
-            }
-            Event::Frame(_) => {
-                progress.step();
-                motion.hand_over(&live.motion);
+            Event::Part(part) => place.roi = [part.x, part.y, part.width, part.height],
+            Event::Frame(_) => progress.step(),
+            // What is interrupted by other settings is of no more use.
+            Event::Report(report, shapes) if !desk.again.load(Ordering::Acquire) => {
+                shown.report(report, json::measured(report, shapes, place, None));
             }
             // The page shows which part was chosen, and warnings with each report.
-            Event::Note(_) => {}
-            Event::Sample(sample) => motion.sample(sample),
-            // What is interrupted by other settings is of no more use.
-            Event::Report(..) if desk.again.load(Ordering::Acquire) => {}
-            Event::Report(report, shapes) => {
-                let json = json::measured(report, shapes, place, None);
-                live.report(report, json);
-            }
+            Event::Report(..) | Event::Sample(_) | Event::Note(_) => {}
         }
         Ok::<(), MeasureError>(())
     });
-    motion.hand_over(&live.motion);
     drop(progress);
     outcome?;
     if live.reports.last().is_none() && !desk.again.load(Ordering::Acquire) {
@@ -259,46 +231,4 @@ fn measure(desk: &Desk, live: &Arc<Live>, feed: Option<Feed>) -> Result<(), Fail
         eprintln!("rowtone: {warning}");
     }
     Ok(())
-}
-
-/// Hands every frame to the page.
-fn pictures(
-    live: &Arc<Live>,
-    width: usize,
-    height: usize,
-    bits: u8,
-) -> impl FnMut(&Frame) + Send + use<> {
-    let live = Arc::clone(live);
-    let format = match bits {
-        ..=8 => RawFormat::Raw8,
-        10 => RawFormat::Raw10,
-        12 => RawFormat::Raw12,
-        _ => RawFormat::Raw16,
-    };
-    let layout = Layout {
-        width: width as u16,
-        height: height as u16,
-        stride: format.bytes(width),
-        format,
-        bayer: false,
-    };
-    // Words of other depths are brought to the upper end of theirs.
-    let shift = if format == RawFormat::Raw16 {
-        16 - bits.min(16)
-    } else {
-        0
-    };
-    let mut shifted = Vec::new();
-    move |frame| {
-        let mut bytes = frame.given();
-        if shift > 0 {
-            shifted.clear();
-            let words = bytes.as_chunks::<2>().0.iter().take(width * height);
-            shifted
-                .extend(words.flat_map(|&word| (u16::from_le_bytes(word) << shift).to_le_bytes()));
-            bytes = &shifted;
-        }
-        live.frames
-            .keep(frame.number, frame.start_ns, layout, bytes);
-    }
 }
