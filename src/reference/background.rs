@@ -23,6 +23,10 @@ pub(super) struct Background {
 
 /// What is under way.
 #[derive(Clone, Copy, Debug, Default)]
+#[expect(
+    clippy::large_enum_variant,
+    reason = "a tracker has one, and no heap to put a variant on"
+)]
 enum Work {
     #[default]
     Nothing,
