@@ -6,6 +6,8 @@
 //! least-squares line; e.g. Brookner, *Tracking and Kalman Filtering Made Easy*, section 1.2.10), whose memory
 //! stops growing after [`MEMORY`] frames so that it follows a drifting oscillator.
 
+use fixed::types::I56F8;
+
 /// Frames that the line is fitted through at most.
 pub const MEMORY: u32 = 256;
 /// Frames after which the period is known well enough to measure by (some parts in a million).
@@ -32,10 +34,10 @@ pub struct FrameStart {
 #[derive(Clone, Debug)]
 pub struct FrameClock {
     nominal_ns: i64,
-    /// Period in 1/256 ns: 1 part in 4·10⁹ of a frame.
-    period: i64,
-    /// Last start, likewise.
-    start: i64,
+    /// Period, ns: to 1/256, which is 1 part in 4·10⁹ of a frame.
+    period: I56F8,
+    /// Last start, ns.
+    start: I56F8,
     frame: u32,
     /// Frames in the filter's memory, at most [`MEMORY`].
     seen: u32,
@@ -43,16 +45,14 @@ pub struct FrameClock {
     late_in_a_row: u32,
 }
 
-const SCALE: i64 = 256;
-
 impl FrameClock {
     /// A clock that expects frames every `nominal_ns`.
     pub const fn new(nominal_ns: i64) -> Self {
         let nominal_ns = if nominal_ns < 1 { 1 } else { nominal_ns };
         Self {
             nominal_ns,
-            period: nominal_ns * SCALE,
-            start: 0,
+            period: I56F8::const_from_int(nominal_ns),
+            start: I56F8::ZERO,
             frame: 0,
             seen: 0,
             glitches: 0,
@@ -62,7 +62,7 @@ impl FrameClock {
 
     /// VSYNC rose at this time. `None` when it came less than half a period after the last: a glitch.
     pub fn vsync(&mut self, now_ns: i64) -> Option<FrameStart> {
-        let now = now_ns.saturating_mul(SCALE);
+        let now = I56F8::saturating_from_num(now_ns);
         if self.seen == 0 {
             (self.start, self.seen) = (now, 1);
             return Some(FrameStart {
@@ -72,7 +72,8 @@ impl FrameClock {
             });
         }
         let elapsed = now.saturating_sub(self.start);
-        let frames = elapsed.saturating_add(self.period / 2) / self.period;
+        let half_more = elapsed.saturating_add(self.period / 2);
+        let frames = half_more.to_bits() / self.period.to_bits();
         if frames < 1 {
             self.glitches = self.glitches.saturating_add(1);
             return None;
@@ -82,28 +83,29 @@ impl FrameClock {
         }
         let predicted = self
             .start
-            .saturating_add(frames.saturating_mul(self.period));
+            .saturating_add(self.period.saturating_mul_int(frames));
         let mut error = now.saturating_sub(predicted);
-        if self.is_settled() && error.saturating_abs() > MOST_LATE_NS * SCALE {
+        if self.is_settled() && error.saturating_abs() > MOST_LATE_NS {
             self.late_in_a_row += 1;
             if self.late_in_a_row >= MOST_LATE {
                 self.restart();
                 return self.vsync(now_ns);
             }
-            error = 0;
+            error = I56F8::ZERO;
         } else {
             self.late_in_a_row = 0;
         }
         let k = i64::from(self.seen);
         self.seen = (self.seen + 1).min(MEMORY);
         let (weights, both) = ((k + 1) * (k + 2), 2 * (2 * k + 1));
-        self.start = predicted.saturating_add(error.saturating_mul(both) / weights);
-        self.period = (self.period + error.saturating_mul(6) / weights / frames).max(1);
+        self.start = predicted.saturating_add(error.saturating_mul_int(both) / weights);
+        self.period =
+            (self.period + error.saturating_mul_int(6) / weights / frames).max(I56F8::DELTA);
         let frames = u32::try_from(frames).unwrap_or(u32::MAX);
         self.frame = self.frame.wrapping_add(frames);
         Some(FrameStart {
             frame: self.frame,
-            start_ns: self.start / SCALE,
+            start_ns: self.start.round_to_zero().to_num(),
             lost: frames - 1,
         })
     }
@@ -124,12 +126,12 @@ impl FrameClock {
 
     /// Time from frame to frame as measured, ps.
     pub const fn period_ps(&self) -> u64 {
-        (self.period as u64).saturating_mul(1000) / SCALE as u64
+        (self.period.to_bits() as u64).saturating_mul(1000) >> I56F8::FRAC_NBITS
     }
 
     /// Measured over nominal period, less 1, in parts in a thousand: wrong clock settings show here.
-    pub const fn off_nominal_permille(&self) -> i64 {
-        (self.period / SCALE - self.nominal_ns) * 1000 / self.nominal_ns
+    pub fn off_nominal_permille(&self) -> i64 {
+        (self.period.to_num::<i64>() - self.nominal_ns) * 1000 / self.nominal_ns
     }
 
     /// VSYNCs that came too early to be any.

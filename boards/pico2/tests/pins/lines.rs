@@ -116,7 +116,7 @@ fn work_that_takes_too_long_loses_lines_but_mistakes_none() {
     let mut board = Board::new(15_000); // 100 µs: one and a half lines
     let overruns = board.run(0..3);
     assert_eq!(overruns as usize + board.taken.len(), 3 * usize::from(ROWS));
-    assert!(overruns >= ROWS.into(), "{overruns}");
+    assert!(overruns >= u32::from(ROWS), "{overruns}");
     board.all_taken_are_true();
 }
 
