@@ -118,7 +118,7 @@ impl Group {
 
     /// What is left of a tone's amplitude after the exposure and the averaging of a group's rows, 0 to 1:
     /// sinc(f·t_exp) · sin(πfRτ)/(R·sin(πfτ)), R rows of line time τ.
-    pub(crate) fn attenuation(&self, hz: f32) -> f32 {
+    pub fn attenuation(&self, hz: f32) -> f32 {
         use core::f32::consts::PI;
         let line = PI * hz * self.timing.line_time_ps() as f32 * 1e-12;
         let rows = self.rows_per_sample as f32;

@@ -11,6 +11,7 @@ use rowtone::timeline::{Group, Sample, Tally, rows_per_sample};
 use rowtone::tracker::Axes;
 
 use crate::MeasureError;
+use crate::keyed::Held;
 use crate::tracking::{FrameShifts, Shifts};
 use crate::wander::Wander;
 use rowtone_clip::{Camera, Rect};
@@ -115,6 +116,12 @@ impl Plan {
         SpectrumMemory::for_axes(self.axes, self.group, self.window_s, self.fps)
     }
 
+    /// Lowest frequency that is looked for, Hz.
+    fn min_hz(&self) -> f64 {
+        let period = 1.0 / self.window_s;
+        self.config.min_hz.map_or(period, f64::from)
+    }
+
     /// Highest frequency that can be reported, Hz.
     pub fn max_hz(&self) -> f64 {
         let spacing_s = match self.group.spacing_ns() {
@@ -152,6 +159,10 @@ pub struct Analysis<'a> {
     wander: Wander,
     /// Frames without samples.
     silence: Silence,
+    /// Reports that wait for the key frames, where a codec took something of the others.
+    held: Option<Held>,
+    group: Group,
+    band_hz: (f64, f64),
 }
 
 impl<'a> Analysis<'a> {
@@ -171,6 +182,9 @@ impl<'a> Analysis<'a> {
             camera_moves: false,
             wander: Wander::new(plan.config.window_ns),
             silence: Silence::new(plan.config.window_ns, plan.config.hop_ns),
+            held: None,
+            group: plan.group,
+            band_hz: (plan.min_hz(), plan.max_hz()),
         })
     }
 
@@ -196,6 +210,12 @@ impl<'a> Analysis<'a> {
         if let Some(report) = self.reports.finish() {
             self.hand_on(report, &mut on)?;
         }
+        if let Some(held) = self.held.take() {
+            let keys = self.shifts.key_samples();
+            for (report, shapes) in held.judged(keys, self.group, self.band_hz) {
+                on(Event::Report(&report, &shapes))?;
+            }
+        }
         outcome
     }
 
@@ -216,12 +236,16 @@ impl<'a> Analysis<'a> {
     ) -> Result<(), E> {
         if let Some(chosen) = frame.chosen {
             self.camera_moves = chosen.camera_moves;
+            self.held = chosen.keyed.then(Held::default);
             on(Event::Part(chosen.part))?;
         }
         for note in &frame.notes {
             on(Event::Note(note))?;
         }
         on(Event::Frame(frame.start_ns))?;
+        if let Some(held) = &mut self.held {
+            held.note_frame(frame.start_ns);
+        }
         let mut tally = Tally::NONE;
         let mut silent = true;
         for reading in &frame.readings {
@@ -270,6 +294,12 @@ impl<'a> Analysis<'a> {
         for row in shapes.iter_mut().flat_map(|s| &mut s.rows) {
             row.row = row.row.saturating_add(self.shifts.part.y as u16);
         }
-        on(Event::Report(&report, &shapes))
+        match &mut self.held {
+            Some(held) => {
+                held.push(report, shapes);
+                Ok(())
+            }
+            None => on(Event::Report(&report, &shapes)),
+        }
     }
 }

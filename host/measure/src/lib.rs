@@ -6,6 +6,7 @@
 
 pub mod analysis;
 mod error;
+mod keyed;
 pub mod restore;
 pub mod tracking;
 mod wander;

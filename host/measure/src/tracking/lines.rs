@@ -4,13 +4,14 @@ use std::panic::resume_unwind;
 use std::thread;
 
 use rowtone::report::{Warning, Warnings};
-use rowtone::timeline::{Displacement, Group};
+use rowtone::timeline::{Displacement, Group, Sample};
 
 use super::codec;
 use super::region::{self, Choice, Region};
 use super::vet::Vet;
-use super::{Chosen, Ending, Engine, FrameShifts, Wanted, background};
+use super::{Chosen, Ending, Engine, Finale, FrameShifts, Wanted, background};
 use crate::MeasureError;
+use rowtone_clip::ffmpeg::{FrameKind, Probe};
 use rowtone_clip::ring::Outlet;
 use rowtone_clip::{Camera, ClipError, Feed, Frame, Rect};
 use rowtone_memory::TrackerMemory;
@@ -23,6 +24,8 @@ const CHOOSE_S: f64 = 0.5;
 const CHOOSE_FRAMES: usize = 256;
 /// Frames of the first round.
 const ROUGH_FRAMES: usize = 10;
+/// Key frames that their own reference is learned from.
+const LEARN_KEYS: usize = 120;
 /// Fewer where they are so large that keeping them would take more than this, bytes of luma.
 const LEARN_BYTES: usize = 512 << 20;
 
@@ -69,6 +72,7 @@ fn measure_all(
     lines.chosen = Some(Chosen {
         part: as_given(&region, &feed.camera),
         camera_moves: choice.camera_moves,
+        keyed: false,
     });
     let mut notes = std::mem::take(&mut feed.notes);
     if region != whole {
@@ -101,8 +105,60 @@ fn measure_all(
         // With a rolling shutter each row is of another time.
         let at_once = feed.camera.timing.is_global_shutter();
         lines.vet = at_once.then(|| Vet::new(part.height));
+        let predicted = |probe: &Probe| probe.key_frames < probe.frames;
+        let keyed = groups.is_some()
+            && camera_has_none(feed)
+            && feed.about.probe.as_ref().is_some_and(predicted);
+        lines.keys = keyed.then(Vec::new);
+        if let Some(chosen) = &mut lines.chosen {
+            chosen.keyed = keyed;
+        }
     }
-    lines.run(feed, kept, more, notes, to)
+    let ended = lines.run(feed, kept, more, notes, to)?;
+    let Some(Measured { warning, keys }) = ended else {
+        return Ok(Finale::default());
+    };
+    let samples = match (groups, keys.len()) {
+        (Some(group), 2..) => {
+            let mut memory = memory_for(&part);
+            measure_keys(feed, &keys, [part, seen], group, &mut memory)?
+        }
+        _ => Vec::new(),
+    };
+    Ok(Finale {
+        warning,
+        keys: samples,
+    })
+}
+
+/// No background is subtracted, whose key frames would have to be measured too.
+fn camera_has_none(feed: &Feed) -> bool {
+    feed.camera.background.is_none()
+}
+
+/// The samples of key frames, the reference learned from themselves; of what was `seen` of a part.
+fn measure_keys(
+    feed: &Feed,
+    keys: &[Frame],
+    [part, seen]: [Rect; 2],
+    group: Group,
+    memory: &mut TrackerMemory,
+) -> Result<Vec<Sample>, MeasureError> {
+    let region = Region {
+        columns: seen.x..seen.x + seen.width,
+        rows: seen.y..seen.y + seen.height,
+    };
+    let mut lines = Lines::new(feed, part, &region, Some(group), memory, None)?;
+    let few = &keys[..keys.len().min(LEARN_KEYS)];
+    lines.learn_roughly(few);
+    lines.learn(few, 1);
+    let mut samples = Vec::new();
+    for frame in keys {
+        lines
+            .moving
+            .measure_into(frame, |reading| samples.extend(reading.sample));
+    }
+    Ok(samples)
 }
 
 /// A region as the user gives it: in the picture as it was.
@@ -147,6 +203,12 @@ fn keep_first(feed: &mut Feed) -> (Vec<Frame>, Result<bool, ClipError>) {
     (kept, Ok(true))
 }
 
+/// All frames have been measured: the feed's warning, and the key frames that were kept.
+struct Measured {
+    warning: Option<String>,
+    keys: Vec<Frame>,
+}
+
 /// State of the line thread.
 struct Lines<'a> {
     moving: Engine<'a>,
@@ -155,6 +217,8 @@ struct Lines<'a> {
     still_rows: Vec<Displacement>,
     /// Where a codec has been at the rows.
     vet: Option<Vet>,
+    /// The key frames, where a codec took something of the others.
+    keys: Option<Vec<Frame>>,
     /// Rows are combined to readings.
     combines: bool,
     /// That stripes were mistaken was told.
@@ -204,6 +268,7 @@ impl<'a> Lines<'a> {
             still,
             still_rows: Vec::new(),
             vet: None,
+            keys: None,
             combines: groups.is_some(),
             slips_told: false,
             chosen: None,
@@ -245,7 +310,7 @@ impl<'a> Lines<'a> {
         }
     }
 
-    /// Measures every frame. The warning at the end is the feed's.
+    /// Measures every frame; then the feed's warning and the key frames that were kept, or nothing where nobody listens.
     fn run(
         &mut self,
         feed: &mut Feed,
@@ -253,7 +318,7 @@ impl<'a> Lines<'a> {
         mut more: Result<bool, ClipError>,
         mut notes: Vec<String>,
         to: &mut Outlet<FrameShifts, Ending>,
-    ) -> Ending {
+    ) -> Result<Option<Measured>, MeasureError> {
         for frame in kept {
             if !self.measure(feed, frame, std::mem::take(&mut notes), to)? {
                 return Ok(None);
@@ -271,7 +336,11 @@ impl<'a> Lines<'a> {
             }
         }
         more?;
-        Ok(feed.warning().map(str::to_owned))
+        let keys = self.keys.take().unwrap_or_default();
+        Ok(Some(Measured {
+            warning: feed.warning().map(str::to_owned),
+            keys,
+        }))
     }
 
     /// Measures a frame and sends what came of it. `false` when nobody listens any more.
@@ -324,7 +393,16 @@ impl<'a> Lines<'a> {
         if frame.is_cut() {
             return Err(feed.cut_short(&frame).into());
         }
-        feed.recycle(frame);
+        let is_key = frame
+            .coding
+            .is_some_and(|coding| coding.kind == FrameKind::Intra);
+        let (width, height) = feed.camera.size;
+        match &mut self.keys {
+            Some(keys) if is_key && keys.len() < LEARN_BYTES / (width * height).max(1) => {
+                keys.push(frame);
+            }
+            _ => feed.recycle(frame),
+        }
         Ok(to.put(shifts))
     }
 }

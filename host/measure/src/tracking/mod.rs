@@ -16,7 +16,7 @@ mod vet;
 
 use rowtone::pipeline::Reading;
 use rowtone::report::Warnings;
-use rowtone::timeline::{Displacement, Group};
+use rowtone::timeline::{Displacement, Group, Sample};
 use rowtone::tracker::Axes;
 
 pub use background::subtract;
@@ -60,16 +60,28 @@ pub struct Chosen {
     pub part: Rect,
     /// All of the picture shakes by more than a part of it vibrates.
     pub camera_moves: bool,
+    /// A codec took something of the frames between key frames, which the end of a file tells.
+    pub keyed: bool,
 }
 
-/// How the lines ended, with the warning that the user is told in the end.
-type Ending = Result<Option<String>, MeasureError>;
+/// How the lines ended.
+type Ending = Result<Finale, MeasureError>;
+
+/// What is known when the lines have ended.
+#[derive(Debug, Default)]
+struct Finale {
+    /// What the user is told in the end.
+    warning: Option<String>,
+    /// The samples of the key frames, against a reference learned from them alone.
+    keys: Vec<Sample>,
+}
 
 /// The displacements of a recording, frame by frame.
 #[derive(Debug)]
 pub struct Shifts {
     inlet: Inlet<FrameShifts, Ending>,
     warning: Option<String>,
+    keys: Vec<Sample>,
     /// The camera that recorded them.
     pub camera: Camera,
     /// The part of the turned picture that is measured.
@@ -123,6 +135,7 @@ impl Shifts {
             inlet,
             axes,
             warning: None,
+            keys: Vec::new(),
             camera,
             part,
             frames,
@@ -142,7 +155,8 @@ impl Shifts {
                 Ok(Some(frame))
             }
             Next::End(ending) => {
-                self.warning = ending?;
+                let finale = ending?;
+                (self.warning, self.keys) = (finale.warning, finale.keys);
                 Ok(None)
             }
             Next::Gone => Ok(None),
@@ -160,6 +174,11 @@ impl Shifts {
     /// Gives a frame's buffers back.
     pub fn recycle(&mut self, frame: FrameShifts) {
         self.inlet.recycle(frame);
+    }
+
+    /// After the last frame: the samples of its key frames, where a codec took something of those between.
+    pub fn key_samples(&self) -> &[Sample] {
+        &self.keys
     }
 
     /// Something to tell the user after the last frame.
