@@ -25,6 +25,8 @@ const USUAL_MAX_HZ: f64 = 2000.0;
 const DENSER: f64 = 2.0;
 /// A tone this much above the usual highest frequency is still reported.
 const JUST_ABOVE: f64 = 1.05;
+/// Most passes over the samples of a window of video whose frames were predicted from each other.
+const PREDICTED_PASSES: u32 = 250;
 /// Most samples of a window.
 const MOST_SAMPLES: usize = 1 << 20;
 
@@ -175,7 +177,12 @@ impl<'a> Analysis<'a> {
         plan: &Plan,
         memory: &'a mut SpectrumMemory,
     ) -> Result<Self, MeasureError> {
-        let reports = ReportSide::new(plan.config, plan.group, memory.lend())?;
+        let mut config = plan.config;
+        if shifts.predicted {
+            // A codec's errors are like a host of tones, and it is key frames that decide.
+            config.max_passes = config.max_passes.min(PREDICTED_PASSES);
+        }
+        let reports = ReportSide::new(config, plan.group, memory.lend())?;
         Ok(Self {
             shifts,
             reports,

@@ -59,7 +59,9 @@ impl Held {
         let largest = reports.iter().flat_map(|(report, _)| &report.peaks);
         let largest = largest.map(|peak| peak.amplitude_px).fold(0.0, f32::max);
         let data = Data::new(keys, group, self.origin_ns.unwrap_or(0));
-        let found = (data.frames >= LEAST_KEYS && largest < PLAIN_PX)
+        // One sample a frame tells no frequency from its images.
+        let at_once = group.timing().is_global_shutter();
+        let found = (data.frames >= LEAST_KEYS && largest < PLAIN_PX && !at_once)
             .then(|| search::search(&data, &hints(&reports), band_hz))
             .flatten();
         match found {

@@ -82,6 +82,8 @@ pub struct Shifts {
     inlet: Inlet<FrameShifts, Ending>,
     warning: Option<String>,
     keys: Vec<Sample>,
+    /// Its file has frames that were predicted from others.
+    pub(crate) predicted: bool,
     /// The camera that recorded them.
     pub camera: Camera,
     /// The part of the turned picture that is measured.
@@ -118,6 +120,8 @@ impl Shifts {
         };
         let (outlet, inlet) = ring(BLOCKS * BLOCK_FRAMES / block, block);
         let (frames, name) = (feed.frames, feed.name.clone());
+        let probe = feed.about.probe.as_ref();
+        let predicted = probe.is_some_and(|probe| probe.key_frames < probe.frames);
         let axes = axes_of_both(&part, &camera);
         // Made here and dropped at once: a part that cannot be measured is refused before anything
         // is read.
@@ -136,6 +140,7 @@ impl Shifts {
             axes,
             warning: None,
             keys: Vec::new(),
+            predicted,
             camera,
             part,
             frames,
