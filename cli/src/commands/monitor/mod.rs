@@ -19,9 +19,13 @@ use rowtone_serial::port::PortName;
 
 /// Options of `rowtone monitor`.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "On a terminal: q, Esc or Ctrl-C leaves.\n\nExample:\n  \
+#[command(
+    after_help = "On a terminal: q, Esc or Ctrl-C leaves. Behind a tone, 2x says that it is twice the running speed, and ? that \
+    it may be another frequency (near a multiple of the frame rate, or weak and not seen before). The trend is that of \
+    its amplitude over the last reports.\n\nExample:\n  \
     rowtone monitor /dev/ttyUSB0 --log vibration.csv\n  \
-    rowtone analyze clip.mp4 --line-time-us 18.9 --format wire \\\n      | rowtone monitor -")]
+    rowtone analyze clip.mp4 --line-time-us 18.9 --format wire \\\n      | rowtone monitor - --live"
+)]
 pub struct Args {
     /// A serial port, with its speed if it is not 115200; a file, or `-` for standard input
     #[arg(value_name = "PORT[:BAUD]")]
@@ -35,6 +39,9 @@ pub struct Args {
     /// End when the port goes away, instead of waiting until it is back
     #[arg(long)]
     once: bool,
+    /// The live view although the input is standard input; keys are read from the terminal
+    #[arg(long, conflicts_with = "format")]
+    live: bool,
 }
 
 /// What `--once` ends with.
@@ -58,7 +65,11 @@ enum Format {
 pub fn run(args: &Args) -> Result<(), Failure> {
     let log = args.log.as_deref().map(log::Log::open).transpose()?;
     let (events, commands) = line::listen(&args.port)?;
-    let on_terminal = std::io::stdout().is_terminal() && args.port.path != "-";
+    let is_terminal = std::io::stdout().is_terminal();
+    if args.live && !is_terminal {
+        return Err(Failure::usage("--live: the output is no terminal"));
+    }
+    let on_terminal = is_terminal && (args.port.path != "-" || args.live);
     match args.format {
         None if on_terminal => screen::run(&args.port.path, args.once, &events, &commands, log),
         format => {

@@ -80,9 +80,10 @@ impl View<'_> {
                             self.report(session, &report, arrival);
                         }
                         Heard::Status(status) => {
+                            // How long it is up would stand still until the next status.
+                            let [major, minor, patch] = status.version;
                             self.said = format!(
-                                "up {} s, {} reports dropped",
-                                status.uptime_ms / 1000,
+                                "version {major}.{minor}.{patch}, {} reports dropped",
                                 status.dropped_reports
                             );
                         }
