@@ -21,6 +21,9 @@ use crate::site::Site;
 pub const MAX_CONNECTIONS: usize = 48;
 /// Most of them that listen to events: the rest polls.
 const MAX_LISTENERS: usize = 16;
+/// Most clips, and most long lists, that are on their way at once: each is in memory until it is taken.
+const MAX_CLIPS: usize = 1;
+const MAX_LISTS: usize = 4;
 /// Requests on one connection.
 const MAX_REQUESTS: usize = 1000;
 /// A connection's thread needs little.
@@ -38,6 +41,19 @@ pub struct Server {
 struct Counts {
     connections: AtomicUsize,
     listeners: AtomicUsize,
+    clips: AtomicUsize,
+    lists: AtomicUsize,
+}
+
+impl Counts {
+    /// The answers of which a slow reader could hold too many.
+    fn large(&self, path: &str) -> Option<(&AtomicUsize, usize)> {
+        match path {
+            "/api/clip.y4m" => Some((&self.clips, MAX_CLIPS)),
+            "/api/reports" | "/api/reports.csv" => Some((&self.lists, MAX_LISTS)),
+            _ => None,
+        }
+    }
 }
 
 /// One of those that are counted, until it is dropped.
@@ -182,6 +198,17 @@ fn serve(stream: TcpStream, site: &Site, counts: &Counts) {
             };
             return connection.refuse(&reply);
         }
+        // Held until it has been sent.
+        let _large = match counts.large(&head.path) {
+            None => None,
+            Some((count, most)) => match One::of(count, most) {
+                Some(one) => Some(one),
+                None => {
+                    let why = "too many are taking this just now: come back in a moment";
+                    return connection.refuse(&Reply::refusal(503, why).with("Retry-After: 2"));
+                }
+            },
+        };
         let viewers = counts.connections.load(Ordering::Relaxed);
         let reply = site.answer(&head, &body, from, viewers);
         let head_only = head.method == Method::Head;

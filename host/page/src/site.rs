@@ -53,7 +53,6 @@ pub struct Site {
     requests: Rates,
     guesses: Rates,
     picture: Mutex<Option<Shown>>,
-    clips: Mutex<()>,
     refused: AtomicU64,
 }
 
@@ -77,7 +76,6 @@ impl Site {
             requests: Rates::new(REQUESTS),
             guesses: Rates::new(GUESSES),
             picture: Mutex::new(None),
-            clips: Mutex::new(()),
             refused: AtomicU64::new(0),
         }
     }
@@ -109,7 +107,7 @@ impl Site {
         Ok(())
     }
 
-    /// Answers a request that was admitted; events are the server's ([`crate::events`]).
+    /// Answers a request that was admitted; events are the server's.
     pub fn answer(&self, head: &Head, body: &[u8], from: IpAddr, viewers: usize) -> Reply {
         let reply = match head.method {
             Method::Get | Method::Head => self.read(head, viewers),
@@ -255,12 +253,7 @@ impl Site {
         })
     }
 
-    /// One at a time: it may be large.
     fn clip(&self) -> Reply {
-        let busy = "another clip is being taken just now: try again";
-        let Ok(_one) = self.clips.try_lock() else {
-            return Reply::refusal(503, busy).with("Retry-After: 2");
-        };
         match clip::y4m(&self.live) {
             Some(bytes) => Reply::new(200, "video/x-yuv4mpeg", bytes)
                 .with("Content-Disposition: attachment; filename=rowtone.y4m"),

@@ -218,6 +218,36 @@ fn a_strangers_name_is_refused_for_reading_too() {
     assert!(answer.starts_with("HTTP/1.1 400 "), "{answer}");
 }
 
+/// A clip that is not taken holds its place, and no second one piles up in memory behind it.
+#[test]
+fn one_clip_is_taken_at_a_time() {
+    let (server, live) = start(Access::Open);
+    let to = server.address();
+    let layout = Layout {
+        width: 2000,
+        height: 1500,
+        stride: 2000,
+        format: RawFormat::Raw8,
+        bayer: false,
+    };
+    let bytes = vec![90; 2000 * 1500];
+    for frame in 0..8 {
+        live.frames.keep(frame, 0, layout, &bytes);
+    }
+    let mut deaf = TcpStream::connect(to).unwrap();
+    write!(deaf, "GET /api/clip.y4m HTTP/1.1\r\nHost: {to}\r\n\r\n").unwrap();
+    // Its answer has begun.
+    assert_eq!(deaf.read(&mut [0; 1]).unwrap(), 1);
+    assert_eq!(get(to, "/api/clip.y4m").0, 503);
+    assert_eq!(get(to, "/api/state").0, 200);
+    drop(deaf);
+    let deadline = Instant::now() + Duration::from_secs(10);
+    while get(to, "/api/clip.y4m").0 != 200 {
+        assert!(Instant::now() < deadline, "its place is never free again");
+        std::thread::sleep(Duration::from_millis(50));
+    }
+}
+
 /// A thousand connections that say nothing, and viewers that do not read: whoever measures goes on, and whoever asks in
 /// earnest is served once the idle ones have run out of time.
 #[test]

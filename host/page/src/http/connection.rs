@@ -12,7 +12,7 @@ const PATIENCE: Duration = Duration::from_secs(5);
 /// An answer must be taken so long after its first byte, and a second more for each [`SLOWEST`] bytes.
 const TAKING: Duration = Duration::from_secs(5);
 /// The slowest reader that is served, bytes a second.
-const SLOWEST: u64 = 64 << 10;
+const SLOWEST: u64 = 256 << 10;
 /// Bytes that are written at once.
 const PIECE: usize = 64 << 10;
 
