@@ -14,6 +14,9 @@ const LEAST_PX: usize = 16;
 /// looked for, ns; but so many.
 const GROUP_NS: f64 = 200e3;
 const GROUP_ROWS: (f64, f64) = (4.0, 32.0);
+/// A strip whose edges all lean one way cannot tell the axes apart: there a motion along the columns is taken for one along
+/// the rows, unless this share of what is known is left without it.
+const LEAST_UPRIGHT: f32 = 0.1;
 /// As many pixels of 8 bits as 16 bits can sum.
 const EIGHT_BIT_FRAMES: usize = 257;
 
@@ -29,8 +32,8 @@ pub(super) struct Shifts {
     pub(super) within_s: Vec<f64>,
     /// Time from one group to the next, s.
     pub(super) step_s: f64,
-    /// Σ h·(r − p/g) of each group and frame, strip by strip: h is the slope of the mean r, orthogonal to it and to
-    /// 1, and g the line's brightness.
+    /// Σ h·(r − p/g) of each group and frame, strip by strip: h is the slope of the mean r along the row, orthogonal to r, to
+    /// 1 and to its slope along the columns, and g the line's brightness.
     pub(super) pulls: Vec<Vec<f32>>,
     /// Σ h·r' of each group, strip by strip: a pull of so much is a shift of 1 px.
     pub(super) grips: Vec<Vec<f32>>,
@@ -114,7 +117,10 @@ struct Row {
     /// Σ of up to [`EIGHT_BIT_FRAMES`] lines, and of all.
     eight_bit: Vec<u16>,
     sums: Vec<u32>,
-    mean: Vec<f32>,
+    /// Means of the row above, of the row itself and of that below.
+    means: [Vec<f32>; 3],
+    /// Which row it is.
+    at: Option<usize>,
     slope: Vec<f32>,
     coefficients: Vec<i8>,
 }
@@ -142,14 +148,31 @@ impl Row {
             kernel: Kernel::detect(),
             eight_bit: vec![0; width],
             sums: vec![0; width],
-            mean: vec![0.0; width],
+            means: std::array::from_fn(|_| vec![0.0; width]),
+            at: None,
             slope: vec![0.0; width],
             coefficients: vec![0; width],
         }
     }
 
-    /// Takes the mean of row `y` over the frames, and its slope; at the picture's edge that is not known.
+    /// Takes the mean of row `y` over the frames and its slopes; at the picture's edge that along the row is not known.
     fn learn<P: Picture>(&mut self, frames: &[P], part: &Rect, y: usize) {
+        let below = (y + 1).min(part.height - 1);
+        if y > 0 && self.at == Some(y - 1) {
+            self.means.rotate_left(1);
+        } else {
+            self.average(frames, part, y.saturating_sub(1), 0);
+            self.average(frames, part, y, 1);
+        }
+        self.average(frames, part, below, 2);
+        self.at = Some(y);
+        for (s, around) in self.slope.iter_mut().skip(1).zip(self.means[1].windows(3)) {
+            *s = (around[2] - around[0]) * 0.5;
+        }
+    }
+
+    /// The mean of row `y` over the frames, as that of the row above, the row itself or the one below.
+    fn average<P: Picture>(&mut self, frames: &[P], part: &Rect, y: usize, which: usize) {
         self.sums.fill(0);
         for frames in frames.chunks(EIGHT_BIT_FRAMES) {
             self.eight_bit.fill(0);
@@ -169,28 +192,38 @@ impl Row {
             sums.for_each(|(s, &few)| *s += u32::from(few));
         }
         let share = 1.0 / frames.len() as f32;
-        for (m, &s) in self.mean.iter_mut().zip(&self.sums) {
+        for (m, &s) in self.means[which].iter_mut().zip(&self.sums) {
             *m = s as f32 * share;
-        }
-        for (s, around) in self.slope.iter_mut().skip(1).zip(self.mean.windows(3)) {
-            *s = (around[2] - around[0]) * 0.5;
         }
     }
 
     /// Coefficients of a strip; `None` where it is evenly lit.
     fn model(&mut self, columns: &Range<usize>) -> Option<Model> {
-        let (mean, slope) = (&self.mean[columns.clone()], &self.slope[columns.clone()]);
+        let [above, mean, below] = self.means.each_ref().map(|m| &m[columns.clone()]);
+        let slope = &self.slope[columns.clone()];
         let n = columns.len() as f32;
         let centre = mean.iter().sum::<f32>() / n;
-        let level = slope.iter().sum::<f32>() / n;
-        let (mut along, mut power) = (0.0, 0.0);
-        for (&r, &s) in mean.iter().zip(slope) {
-            along += (r - centre) * s;
-            power += (r - centre) * (r - centre);
+        let power: f32 = mean.iter().map(|r| (r - centre) * (r - centre)).sum();
+        let down: Vec<f32> = (above.iter().zip(below))
+            .map(|(a, b)| 0.5 * (b - a))
+            .collect();
+        let [level, lean] = level_and_lean(slope, mean, centre, power);
+        let [down_level, down_lean] = level_and_lean(&down, mean, centre, power);
+        let across = |x: usize| slope[x] - level - lean * (mean[x] - centre);
+        let along = |x: usize| down[x] - down_level - down_lean * (mean[x] - centre);
+        let [mut own, mut both, mut other] = [0.0_f32; 3];
+        for x in 0..columns.len() {
+            let (h, d) = (across(x), along(x));
+            own += h * h;
+            both += h * d;
+            other += d * d;
         }
-        let lean = if power > 0.0 { along / power } else { 0.0 };
-        let h = |r: f32, s: f32| s - level - lean * (r - centre);
-        let pairs = || mean.iter().zip(slope).map(|(&r, &s)| (h(r, s), r, s));
+        let turn = if other > 0.0 && own - both * both / other > LEAST_UPRIGHT * own {
+            both / other
+        } else {
+            0.0
+        };
+        let pairs = || (0..columns.len()).map(|x| (across(x) - turn * along(x), mean[x], slope[x]));
         let largest = pairs().map(|(h, ..)| h.abs()).fold(0.0, f32::max);
         let scale = f32::from(MAX_COEFFICIENT) / largest;
         if !scale.is_finite() {
@@ -223,4 +256,12 @@ impl Row {
         };
         (sums.product as f32, sums.pixels as f32)
     }
+}
+
+/// The mean of a row's slope, and how much of the row itself there is in it.
+fn level_and_lean(slope: &[f32], mean: &[f32], centre: f32, power: f32) -> [f32; 2] {
+    let level = slope.iter().sum::<f32>() / slope.len().max(1) as f32;
+    let pairs = slope.iter().zip(mean);
+    let along: f32 = pairs.map(|(s, r)| (r - centre) * s).sum();
+    [level, if power > 0.0 { along / power } else { 0.0 }]
 }
