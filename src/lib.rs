@@ -21,6 +21,7 @@
 //! - [`tracker`]: learns the reference, finds each line's displacement, knows when it is lost.
 //! - [`timeline`]: displacements of rows become samples in time, with weights.
 //! - [`spectrum`]: the tones in a window of samples, with their uncertainty, by joint least squares.
+//! - [`shape`]: beside the pipeline, what a known tone does in every tile of the picture.
 //! - [`report`]: what is said of a window, in which units.
 //! - [`wire`]: a report as bytes and back.
 //! - [`link`]: a board's end of the serial line: settings, the outbox, the Modbus server.
@@ -84,6 +85,7 @@ mod math;
 pub mod pipeline;
 pub mod reference;
 pub mod report;
+pub mod shape;
 pub mod spectrum;
 pub mod timeline;
 pub mod tracker;

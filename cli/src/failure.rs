@@ -7,6 +7,7 @@ use rowtone_clip::{ClipError, OptionError};
 #[cfg(feature = "lab")]
 use rowtone_lab::LabError;
 use rowtone_measure::MeasureError;
+use rowtone_measure::shapes::ShapesError;
 use rowtone_plot::PlotError;
 use rowtone_serial::SerialError;
 
@@ -102,6 +103,20 @@ impl From<MeasureError> for Failure {
         match error {
             MeasureError::Clip(error) => error.into(),
             MeasureError::Settings(error) => Self::usage(error.to_string()),
+            _ => Self::input(error.to_string()),
+        }
+    }
+}
+
+/// Shapes that cannot be had.
+impl From<ShapesError> for Failure {
+    fn from(error: ShapesError) -> Self {
+        match error {
+            ShapesError::Measure(error) => error.into(),
+            ShapesError::Pipe
+            | ShapesError::Grid(_)
+            | ShapesError::Hidden(_)
+            | ShapesError::Alike(_) => Self::usage(error.to_string()),
             _ => Self::input(error.to_string()),
         }
     }

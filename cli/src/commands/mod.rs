@@ -26,6 +26,7 @@ pub mod gateway;
 mod missing;
 pub mod monitor;
 pub mod serve;
+pub mod shapes;
 pub mod simulate;
 #[cfg(feature = "lab")]
 pub mod sweep;
@@ -54,6 +55,8 @@ enum Command {
     Analyze(analyze::Args),
     /// Writes the motion over time as CSV, NPY or WAV
     Displacement(displacement::Args),
+    /// Shows what vibrates where: amplitude and phase of each tone over the picture
+    Shapes(shapes::Args),
     /// Decodes what a board sends over a serial port
     Monitor(monitor::Args),
     /// Shows a recording, a live pipe or a board in the browser
@@ -95,6 +98,7 @@ fn run(command: &Command) -> Result<(), Failure> {
         Command::Demo(args) => demo::run(args),
         Command::Analyze(args) => analyze::run(args),
         Command::Displacement(args) => displacement::run(args),
+        Command::Shapes(args) => shapes::run(args),
         Command::Monitor(args) => monitor::run(args),
         Command::Serve(args) => serve::run(args),
         #[cfg(feature = "gateway")]

@@ -76,7 +76,7 @@ fn seconds(text: &str) -> Result<f64, String> {
     in_range(text, 0.001, 3600.0, "s")
 }
 
-fn hertz(text: &str) -> Result<f64, String> {
+pub(super) fn hertz(text: &str) -> Result<f64, String> {
     in_range(text, 1e-3, 1e6, "Hz")
 }
 

@@ -1,0 +1,163 @@
+//! Operating deflection shapes: amplitude and phase of each tone in every tile of the picture.
+//!
+//! [`measure`] reads a recording three times: once to find its tones, as `rowtone analyze` does ([`tones`]); once for its
+//! mean picture, against which everything is measured (`mean`); and once for the sums of the tiles
+//! ([`rowtone::shape`]), kept in some blocks of time (`blocks`). All tones, and what wanders slowly, are then fitted together
+//! in each tile; the blocks tell the frequencies better than a window does, and the noise beside each tone (`fit`).
+
+mod blocks;
+mod error;
+mod fit;
+mod mean;
+mod pass;
+pub mod tones;
+
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use num_complex::Complex64;
+use rowtone::shape::Grid;
+
+use rowtone_clip::{CameraOptions, Feed, Rect};
+
+pub use self::error::{Alike, Hidden, RecordingError, ShapesError};
+
+use self::mean::Mean;
+use self::tones::Tones;
+
+/// What is wanted of a recording.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Wanted {
+    /// Frequencies, Hz; none for those that are found.
+    pub hz: Vec<f64>,
+    /// Side of a tile, px.
+    pub tile_px: u16,
+    /// Window in which tones are looked for, s.
+    pub window_s: f64,
+    /// Most tones where none are given.
+    pub most: usize,
+}
+
+impl Default for Wanted {
+    fn default() -> Self {
+        Self {
+            hz: Vec::new(),
+            tile_px: 16,
+            window_s: 1.0,
+            most: 8,
+        }
+    }
+}
+
+/// The shape of one tone. Lists hold one entry a tile, row by row.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Shape {
+    /// Frequency, Hz.
+    pub hz: f64,
+    /// Amplitude along x, px: the motion is Re X·e^(2πift), exposure undone, phase against the largest tile. `None` outside the
+    /// part and where the texture cannot tell.
+    pub x: Vec<Option<Complex64>>,
+    /// The same along y, downwards.
+    pub y: Vec<Option<Complex64>>,
+    /// Standard deviation of a real or imaginary part of `x`, px.
+    pub x_sd: Vec<Option<f64>>,
+    /// The same of `y`.
+    pub y_sd: Vec<Option<f64>>,
+    /// The tile surely moves: by chance one in a thousand pictures has a tile that says so and stands still.
+    pub moves: Vec<bool>,
+}
+
+impl Shape {
+    /// Standard deviation of a tile's real or imaginary parts, the root mean square of the axes that are known, px.
+    pub fn sd(&self, tile: usize) -> Option<f64> {
+        let known = |sd: &[Option<f64>]| sd.get(tile).copied().flatten();
+        match (known(&self.x_sd), known(&self.y_sd)) {
+            (Some(x), Some(y)) => Some((0.5 * (x * x + y * y)).sqrt()),
+            (x, y) => x.or(y),
+        }
+    }
+
+    /// The larger semi-axis of a tile's orbit, px; 0 where nothing is known.
+    pub fn amplitude_px(&self, tile: usize) -> f64 {
+        let known =
+            |all: &[Option<Complex64>]| all.get(tile).copied().flatten().unwrap_or_default();
+        semi_major(known(&self.x), known(&self.y))
+    }
+}
+
+/// The larger semi-axis of the orbit Re (x, y)·e^(iωt).
+pub fn semi_major(x: Complex64, y: Complex64) -> f64 {
+    let sum = x.norm_sqr() + y.norm_sqr();
+    let squares = (x * x + y * y).norm();
+    (0.5 * (sum + squares)).sqrt()
+}
+
+/// The shapes of a recording.
+#[derive(Clone, Debug)]
+pub struct Shapes {
+    /// How the turned picture is cut.
+    pub grid: Grid,
+    /// One shape a tone: in the order asked for, or the largest first.
+    pub shapes: Vec<Shape>,
+    /// The mean picture, grey values row by row.
+    pub mean: Vec<f32>,
+    /// Bits of a pixel.
+    pub bits: u8,
+    /// The part that was measured.
+    pub part: Rect,
+    /// Frames used.
+    pub frames: u32,
+    /// What the user should know, a line each.
+    pub notes: Vec<String>,
+}
+
+/// Measures the shapes of a recording. `stop` ends it as if the recording ended there; `step` is called for every frame that
+/// was read, three times for each.
+///
+/// # Errors
+/// [`ShapesError`] for frequencies that cannot be told, for standard input, which cannot be read again, and where nothing
+/// vibrates or nothing can be measured.
+pub fn measure(
+    options: &CameraOptions,
+    wanted: &Wanted,
+    stop: &Arc<AtomicBool>,
+    mut step: impl FnMut(),
+) -> Result<Shapes, ShapesError> {
+    if options.is_pipe() {
+        return Err(ShapesError::Pipe);
+    }
+    let open = || {
+        let mut feed = Feed::open(options)?;
+        feed.stop_when(Arc::clone(stop));
+        Ok::<Feed, ShapesError>(feed)
+    };
+    let feed = open()?;
+    let (name, camera) = (feed.name.clone(), feed.camera.clone());
+    let (width, height) = camera.size;
+    let grid = Grid::new(width as u16, height as u16, wanted.tile_px).map_err(ShapesError::Grid)?;
+    let found = tones::find(feed, wanted, &mut step)?;
+    let mean = Mean::read(&mut open()?, &mut step)?;
+    let mut tones = Tones::choose(&name, wanted, found, &camera, mean.seconds())?;
+    let run = |hz: &[f64], step: &mut dyn FnMut()| pass::run(&mut open()?, &mean, grid, hz, step);
+    let mut sums = run(&tones.hz(), &mut step)?;
+    // A frequency that was far off is set right and read again.
+    if let Some(better) = fit::refined(&sums, &tones, &camera) {
+        tones.set(&better);
+        if fit::is_far(&sums, &tones) {
+            sums = run(&tones.hz(), &mut step)?;
+            if let Some(better) = fit::refined(&sums, &tones, &camera) {
+                tones.set(&better);
+            }
+        }
+    }
+    let shapes = fit::shapes(&name, &sums, &tones, &camera)?;
+    Ok(Shapes {
+        grid,
+        shapes,
+        bits: camera.bits,
+        part: camera.part.unwrap_or(Rect::whole(width, height)),
+        frames: sums.blocks.frames(),
+        notes: tones.notes,
+        mean: mean.pixels,
+    })
+}
