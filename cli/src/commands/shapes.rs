@@ -6,6 +6,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
+use num_complex::Complex64;
 
 use crate::camera_args::CameraArgs;
 use crate::failure::Failure;
@@ -13,11 +14,12 @@ use crate::output::Out;
 use crate::output::progress::Progress;
 use rowtone_files::WholeFile;
 use rowtone_measure::shapes::{self, Shape, Shapes, Wanted};
+use rowtone_plot::{Panel, Plate};
 
 /// Options of `rowtone shapes`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
-    rowtone shapes clip.mp4 --line-time-us 18.9 --exposure-us 500 -o shape.json\n  \
+    rowtone shapes clip.mp4 --line-time-us 18.9 --exposure-us 500 -o shape.png\n  \
     rowtone shapes clip.y4m --line-time-us 18.9 --hz 131.7,1017 --format json\n\n\
     A picture is cut into tiles, and each tile tells its own amplitude and phase, far beyond half the\n\
     frame rate: its rows are exposed one after the other. JSON: a list with one object a tone, whose\n\
@@ -43,7 +45,7 @@ pub struct Args {
     #[arg(long, value_enum, default_value = "text")]
     format: Format,
     /// Writes the shapes to a file, by its ending
-    #[arg(short, long, value_name = "FILE.json")]
+    #[arg(short, long, value_name = "FILE.png|.svg|.json")]
     output: Option<PathBuf>,
 }
 
@@ -58,6 +60,7 @@ enum Format {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
     Json,
+    Picture,
 }
 
 impl Kind {
@@ -66,8 +69,9 @@ impl Kind {
         let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase());
         match ending.as_deref() {
             Some("json") => Ok(Self::Json),
+            Some("png" | "svg") => Ok(Self::Picture),
             _ => Err(Failure::usage(format!(
-                "-o {}: its ending says what is written: .json",
+                "-o {}: its ending says what is written: .png, .svg or .json",
                 path.display()
             ))),
         }
@@ -101,10 +105,10 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     }
     drop(progress);
     if let (Some(kind), Some(path)) = (kind, &args.output) {
-        let bytes = match kind {
-            Kind::Json => json::text(&shapes).into_bytes(),
-        };
-        write(path, &bytes)?;
+        match kind {
+            Kind::Json => write(path, json::text(&shapes).as_bytes())?,
+            Kind::Picture => rowtone_plot::write(path, &plate(&shapes))?,
+        }
     }
     let mut out = Out::default();
     match args.format {
@@ -122,6 +126,29 @@ fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
         file.finish()
     });
     written.map_err(|e| Failure::writing(&path.display().to_string(), &e))
+}
+
+/// All shapes side by side; tiles that do not surely move are left out.
+fn plate(shapes: &Shapes) -> Plate<'_> {
+    let panel = |shape: &Shape| {
+        let tile = |tile: usize| {
+            let pair = |all: &[Option<Complex64>]| {
+                let px = all[tile].unwrap_or_default();
+                [px.re, px.im]
+            };
+            shape.moves[tile].then(|| [pair(&shape.x), pair(&shape.y)])
+        };
+        Panel {
+            title: sentence(shape, shapes).trim_start().to_owned(),
+            tiles: (0..shape.moves.len()).map(tile).collect(),
+        }
+    };
+    Plate {
+        picture: &shapes.mean,
+        size: (shapes.grid.width(), shapes.grid.height()),
+        tile_px: shapes.grid.tile_px(),
+        panels: shapes.shapes.iter().map(panel).collect(),
+    }
 }
 
 /// What a person is told of a shape.

@@ -14,7 +14,7 @@ use rowtone_report::text::digits;
 /// Size of the picture, px.
 pub(super) const SIZE: (u32, u32) = (1200, 860);
 
-const INK: RGBColor = RGBColor(38, 44, 52);
+pub(super) const INK: RGBColor = RGBColor(38, 44, 52);
 const GRID: RGBColor = RGBColor(226, 230, 234);
 const FLOOR: RGBColor = RGBColor(120, 140, 160);
 const TONE: RGBColor = RGBColor(202, 60, 40);
@@ -50,8 +50,8 @@ pub(super) struct Scene<'a> {
     pub one_a_frame: bool,
 }
 
-type Area<B> = DrawingArea<B, Shift>;
-type Drawn = Result<(), DrawError>;
+pub(super) type Area<B> = DrawingArea<B, Shift>;
+pub(super) type Drawn = Result<(), DrawError>;
 
 impl Drawing for Scene<'_> {
     fn size(&self) -> (u32, u32) {
@@ -73,7 +73,7 @@ impl Drawing for Scene<'_> {
     }
 }
 
-fn font(size: u32) -> TextStyle<'static> {
+pub(super) fn font(size: u32) -> TextStyle<'static> {
     ("sans-serif", size).into_font().color(&INK)
 }
 
@@ -280,8 +280,13 @@ where
 }
 
 /// A shade as a colour.
-fn colour(shade: i32) -> RGBColor {
-    let place = f64::from(shade.clamp(0, SHADES)) / f64::from(SHADES) * (MAP.len() - 1) as f64;
+fn colour(number: i32) -> RGBColor {
+    shade(f64::from(number) / f64::from(SHADES))
+}
+
+/// A share from 0, dark, to 1, bright, as a colour.
+pub(super) fn shade(share: f64) -> RGBColor {
+    let place = share.clamp(0.0, 1.0) * (MAP.len() - 1) as f64;
     let below = (place as usize).min(MAP.len() - 2);
     let part = place - below as f64;
     let mix = |a: u8, b: u8| (f64::from(a) + part * (f64::from(b) - f64::from(a))).round() as u8;

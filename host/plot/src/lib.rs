@@ -1,13 +1,14 @@
 //! A recording as a picture: spectrum, displacement over a few frames, spectrogram.
 //!
 //! A [`Picture`] is shown every sample and every report and drawn at the end. It keeps the samples of
-//! one window and a bounded number of spectra, so it does not grow with the recording.
+//! one window and a bounded number of spectra, so it does not grow with the recording. A [`Plate`] shows the shapes of tones.
 
 mod canvas;
 mod draw;
 mod error;
 mod file;
 mod glyphs;
+mod plate;
 mod residual;
 mod spectrogram;
 
@@ -18,6 +19,8 @@ use rowtone::report::Report;
 use rowtone::timeline::Sample;
 
 pub use error::{DrawError, PlotError};
+pub use plate::{Panel, Phasors, Plate};
+
 pub use file::{Drawing, check_ending, png, svg, write};
 
 use self::residual::Fit;
