@@ -70,16 +70,18 @@ class Browser:
         elif event.get("method") == "Runtime.consoleAPICalled" and params["type"] in ("error", "warning", "assert"):
             self.errors.append(str([a.get("value") for a in params["args"]]))
 
-    def value(self, expression):
+    def value(self, expression, waiting=False):
         result = self.call("Runtime.evaluate", expression=expression, awaitPromise=True, returnByValue=True)
         if "exceptionDetails" in result:
+            if waiting:  # for a page that is not there yet
+                return None
             raise SystemExit(f"{expression}: {result['exceptionDetails']}")
         return result["result"].get("value")
 
     def wait(self, expression, what, seconds=30):
         end = time.time() + seconds
         while time.time() < end:
-            found = self.value(expression)
+            found = self.value(expression, waiting=True)
             if found:
                 return found
             time.sleep(0.1)
@@ -140,7 +142,7 @@ def main():
     parser.add_argument("--whole", metavar="FILE.png", help="all of the page, scrolled or not")
     parser.add_argument("--dark", action="store_true", help="as for those who prefer it dark")
     args = parser.parse_args()
-    ended = "typeof DATA !== 'undefined' && DATA.state?.phase === 'ended' && document.body.dataset.peaks"
+    ended = "DATA.state?.phase === 'ended' && document.body.dataset.peaks"
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
         clip = f"{folder}/press.y4m"
         tone_args = [word for hz, px in TONES for word in ("--tone", f"{hz}:{px}")]

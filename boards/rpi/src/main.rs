@@ -136,6 +136,15 @@ fn configure(cli: &Cli) -> Result<Config, String> {
     if let Some(us) = cli.line_time_us {
         config.camera.line_time_s = Some(positive("line-time-us", us)? * 1e-6);
     }
+    // A camera may come later; a file that is not there is a mistake.
+    if let Some(file) = &config.camera.calibration
+        && let Err(e) = std::fs::metadata(file)
+    {
+        let file = file.display();
+        return Err(format!(
+            "camera.calibration {file}: {e}: make it with `rowtone calibrate -o FILE`"
+        ));
+    }
     if let Some(us) = cli.frame_period_us {
         config.camera.replay = Some(Replay {
             take_every: cli.take_every.unwrap_or(1).max(1),

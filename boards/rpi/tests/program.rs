@@ -219,6 +219,14 @@ fn a_wrong_configuration_is_named_by_file_line_and_key() {
     let said = String::from_utf8(done.stderr).unwrap();
     let wanted = format!("rowtone-rpi: {path}:3: measure.hop_s is 7.5: give 0.01 to 1\n");
     assert_eq!(said, wanted);
+    let path = file(
+        "uncalibrated",
+        "[camera]\ncalibration = \"/nowhere/cal.toml\"\n",
+    );
+    let done = output(&["--simulate", "--config", path.to_str().unwrap()]);
+    assert_eq!(done.status.code(), Some(2), "it is not tried for ever");
+    let said = String::from_utf8(done.stderr).unwrap();
+    assert!(said.contains("/nowhere/cal.toml: No such file"), "{said}");
     let done = output(&["--simulate", "--config", "/nonexistent.toml"]);
     assert_eq!(done.status.code(), Some(2));
     let said = String::from_utf8(done.stderr).unwrap();

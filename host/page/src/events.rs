@@ -1,13 +1,13 @@
 //! Reports as server-sent events (HTML Standard, 9.2), for as long as somebody listens.
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use crate::http::connection::{Broken, Connection};
 use crate::http::request::Head;
 use crate::reports::News;
 use crate::site::Site;
 
-/// A listener without news gets the state so often, which also shows whether it is still there.
+/// A listener gets the state so often, which also shows whether it is still there.
 const EVERY: Duration = Duration::from_secs(1);
 /// Old reports that a new listener gets.
 const OLD: usize = 300;
@@ -34,8 +34,16 @@ pub(crate) fn serve(site: &Site, head: &Head, to: &mut Connection) -> Result<(),
         _ => (now, 0),
     };
     let mut most = OLD;
+    // However often reports come, the state comes too.
+    let mut due = Instant::now();
     loop {
-        let text = match site.live.reports.wait(epoch, id, most, EVERY) {
+        let left = due.saturating_duration_since(Instant::now());
+        if left.is_zero() {
+            to.write(format!("event: state\ndata: {}\n\n", site.state()).as_bytes())?;
+            due = Instant::now() + EVERY;
+            continue;
+        }
+        let text = match site.live.reports.wait(epoch, id, most, left) {
             News::Reports(entries) => {
                 let mut text = String::new();
                 for entry in &entries {
@@ -52,7 +60,7 @@ pub(crate) fn serve(site: &Site, head: &Head, to: &mut Connection) -> Result<(),
                 epoch = now;
                 format!("event: restart\nid: {epoch}-{id}\ndata: {{}}\n\n")
             }
-            News::Nothing => format!("event: state\ndata: {}\n\n", site.state()),
+            News::Nothing => continue,
             News::Closed => return Ok(()),
         };
         to.write(text.as_bytes())?;

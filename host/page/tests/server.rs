@@ -160,6 +160,28 @@ fn events_follow_the_reports() {
     );
 }
 
+/// Of a camera whose reports come faster than that, the state comes once a second all the same; and whoever listens
+/// looks, so that pictures are kept.
+#[test]
+fn the_state_comes_among_many_reports() {
+    let (server, live) = start(Access::Open);
+    let to = server.address();
+    let mut stream = TcpStream::connect(to).unwrap();
+    write!(stream, "GET /api/reports HTTP/1.1\r\nHost: {to}\r\n\r\n").unwrap();
+    let report = rowtone_report::example(None);
+    for _ in 0..25 {
+        live.report(&report, rowtone_report::json::report(&report));
+        std::thread::sleep(Duration::from_millis(100));
+    }
+    assert!(live.frames.is_wanted());
+    live.reports.close();
+    let mut text = String::new();
+    stream.read_to_string(&mut text).expect("it ends");
+    let states = text.matches("event: state").count();
+    assert!((2..=4).contains(&states), "{states}");
+    assert_eq!(text.matches("event: report").count(), 25);
+}
+
 #[test]
 fn changes_ask_for_the_password_and_for_our_own_page() {
     let (server, _live) = start(Access::Password(Keeper::default()));

@@ -135,7 +135,7 @@ function drawWaterfall(reports) {
   const y = { from: -span, to: 0, ticks: ticks(-span, 0, 4, "").map(([v, l]) => [v, Math.abs(v) < 1e-9 ? "now" : `${l} s`]), room: 52 };
   const { atX, atY, area } = axes(c, { from: 0, to: toHz, ticks: ticks(0, toHz, 8, "Hz") }, y);
   const largest = Math.max(1e-9, ...shown.flatMap((r) => r.peaks.map((p) => p.amplitude_px)));
-  const each = Math.max(2, (area.bottom - area.top) / Math.max(2, shown.length));
+  const each = Math.max(2, (area.bottom - area.top) / Math.max(1, shown.length - 1) + 1);
   for (const report of shown) {
     const top = atY(report.t_s - newest.t_s);
     for (const peak of report.peaks) {

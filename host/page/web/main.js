@@ -36,7 +36,7 @@ function flags(peak) {
 function drawPeaks(report) {
   const [scale, unit] = unitOf(report);
   const scaled = unit === "µm";
-  const both = report.peaks.some((peak) => peak.x_px !== undefined);
+  const both = report.peaks.some((peak) => Number.isFinite(peak.y_px));
   const columns = [["Hz"], ["amplitude", unit], ...(both ? [["x", unit, "wide"], ["y", unit, "wide"]] : []), ...(scaled ? [["velocity", "mm/s"]] : []), ["SNR", "dB", "wide"], [""]];
   $("peaks-head").replaceChildren(...columns.map(([name, of, wide]) => {
     const head = element("th", name, wide);
