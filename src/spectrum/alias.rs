@@ -26,7 +26,7 @@ const ZERO: Complex = Complex::new(0.0, 0.0);
 pub(crate) const BANDS: usize = 12;
 
 /// The frames' part of the scores in [`Samples::score_re`] and [`Samples::score_im`].
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Scores {
     plain: f32,
     pseudo: Complex,
@@ -59,7 +59,9 @@ impl Samples<'_> {
         i: usize,
         without: impl Fn(usize) -> bool,
     ) -> Scores {
-        let mut others = model.clone();
+        let Some(mut others) = self.copy_of(model) else {
+            return Scores::default();
+        };
         for (j, tone) in others.tones.iter_mut().enumerate() {
             if without(j) {
                 tone.shape.clear();

@@ -47,14 +47,16 @@ impl Search {
         let Some(highest) = highest.first().copied() else {
             return false;
         };
-        let mut best = model.clone();
+        let Some(mut best) = samples.copy_of(model) else {
+            return false;
+        };
         let start = Tone::steady(highest.frequency, highest.axis);
         if !self.put(samples, fit, &mut best, start) {
             return false;
         }
         let found = self.changes(samples, fit, model, &mut best, residual);
         if found {
-            *model = best;
+            model.copy(&best);
         } else {
             residual.forget();
         }
@@ -81,7 +83,7 @@ impl Search {
         if low || self.tired(fit) || !residual.may_try_changing() {
             return false;
         }
-        best.clone_from(model);
+        best.copy(model);
         if best.tones.push(steady).is_err() {
             return false;
         }
@@ -111,7 +113,9 @@ impl Search {
             if self.tired(fit) {
                 break;
             }
-            let mut trial = model.clone();
+            let Some(mut trial) = samples.copy_of(model) else {
+                break;
+            };
             let _ = trial.tones.push(start);
             fit.refine(samples, &mut trial, STEPS);
             if start.onset.is_some() {
@@ -127,7 +131,7 @@ impl Search {
             let sound = stayed && self.sound(samples, &trial);
             if sound && least.is_none_or(|least| trial.squares < least) {
                 least = Some(trial.squares);
-                *best = trial;
+                best.copy(&trial);
             }
         }
         least.is_some() && self.judged(samples, model, best, residual) == Verdict::Tone

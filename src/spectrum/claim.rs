@@ -25,14 +25,16 @@ impl Search {
         let Some(i) = larger else { return };
         if self.is_shape(samples, fit, model, i) {
             let variance = model.squares / Fit::freedom(samples, model).max(1.0);
-            let mut without = model.clone();
+            let Some(mut without) = samples.copy_of(model) else {
+                return;
+            };
             without.tones.pop();
             fit.refine(samples, &mut without, STEPS);
             if self.stand(samples, fit, &mut without, i)
                 && without.squares
                     < model.squares + A_NUMBER * variance * (numbers(model) - numbers(&without))
             {
-                *model = without;
+                model.copy(&without);
                 return;
             }
         }

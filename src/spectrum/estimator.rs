@@ -21,14 +21,8 @@ pub struct Estimator<'a> {
     config: Config,
     group: Group,
     storage: EstimatorStorage<'a>,
-    fit: Fit,
-    model: Model,
-    /// What explains the samples as if the noise were white.
-    plain: Model,
-    noise: [Noise; 2],
     mark: WindowMark,
     loaded: Loaded,
-    shapes: Shapes,
 }
 
 impl<'a> Estimator<'a> {
@@ -44,13 +38,8 @@ impl<'a> Estimator<'a> {
             config,
             group,
             storage,
-            fit: Fit::new(),
-            model: Model::new(0),
-            plain: Model::new(0),
-            noise: [Noise::new(), Noise::new()],
             mark: WindowMark::default(),
             loaded: Loaded::default(),
-            shapes: Shapes::new(),
         };
         estimator.check_storage()?;
         Ok(estimator)
@@ -68,10 +57,9 @@ impl<'a> Estimator<'a> {
             return Err(error);
         }
         self.config = config;
-        self.model = Model::new(0);
         self.mark = WindowMark::default();
         self.loaded = Loaded::default();
-        self.shapes.clear();
+        self.storage.workspace.shapes.clear();
         Ok(())
     }
 
@@ -131,12 +119,12 @@ impl<'a> Estimator<'a> {
 
     /// Passes over the samples that the last window took: what its cost is proportional to.
     pub const fn passes(&self) -> u32 {
-        self.fit.passes
+        self.storage.workspace.fit.passes
     }
 
     /// How the peaks of the last window run over the rows that are not rigid.
     pub fn shapes(&self) -> &[PeakShape] {
-        &self.shapes
+        &self.storage.workspace.shapes
     }
 
     /// The window loaded last.
@@ -160,7 +148,7 @@ impl<'a> Estimator<'a> {
     /// Fits tones to the loaded window.
     pub fn tones(&mut self) -> Tones {
         let l = self.loaded;
-        self.shapes.clear();
+        self.storage.workspace.shapes.clear();
         if l.frames < 2 || l.count < 8 || l.total_weight <= 0.0 {
             return Tones::nothing(l.fps);
         }
@@ -174,15 +162,10 @@ impl<'a> Estimator<'a> {
             false_alarm: self.config.false_alarm,
             most_passes: self.config.max_passes,
         };
-        let (mut samples, grid) = view(&mut self.storage, &l, &self.group);
-        let mut residual = Residual::new(&samples, band, grid, &mut self.noise);
-        let outcome = search.run(
-            &mut samples,
-            &mut self.fit,
-            &mut self.model,
-            &mut self.plain,
-            &mut residual,
-        );
+        let (mut samples, grid, work) = view(&mut self.storage, &l, &self.group);
+        let mut residual = Residual::new(&samples, band, grid, work.noise);
+        let (fit, model, plain) = (work.fit, work.model, work.plain);
+        let outcome = search.run(&mut samples, fit, model, plain, &mut residual);
         let mut tones = Telling {
             config: &self.config,
             group: &self.group,
@@ -198,10 +181,10 @@ impl<'a> Estimator<'a> {
         }
         .tones(
             &mut samples,
-            &mut self.fit,
-            (&self.model, &self.plain),
+            fit,
+            (model, plain),
             &mut residual,
-            &mut self.shapes,
+            work.shapes,
         );
         tones.more |= outcome.more;
         tones
@@ -226,14 +209,24 @@ impl<'a> Estimator<'a> {
     }
 }
 
-/// The loaded window as the passes see it, and the grid.
+/// What the fit works in, apart.
+struct Work<'s> {
+    fit: &'s mut Fit,
+    model: &'s mut Model,
+    plain: &'s mut Model,
+    noise: &'s mut [Noise; 2],
+    shapes: &'s mut Shapes,
+}
+
+/// The loaded window as the passes see it, the grid, and what the fit works in.
 fn view<'s>(
     storage: &'s mut EstimatorStorage<'_>,
     l: &Loaded,
     group: &Group,
-) -> (Samples<'s>, &'s mut [f32]) {
+) -> (Samples<'s>, &'s mut [f32], Work<'s>) {
     let frames = l.frames;
     let slots = usize::from(group.slots());
+    let work = &mut *storage.workspace;
     let mut rows = storage.frame_rows.chunks_exact_mut(frames);
     let mut row = || rows.next().unwrap_or_default();
     let (frame_t, frame_weight, scratch, row_t, own_re, own_im) =
@@ -286,7 +279,15 @@ fn view<'s>(
         total_weight: l.total_weight,
         count: l.count,
         length_s: l.length_s,
+        spares: &work.spares,
     };
     samples.lean();
-    (samples, storage.grid)
+    let work = Work {
+        fit: &mut work.fit,
+        model: &mut work.model,
+        plain: &mut work.plain,
+        noise: &mut work.noise,
+        shapes: &mut work.shapes,
+    };
+    (samples, storage.grid, work)
 }

@@ -58,14 +58,28 @@ impl Model {
         self.tones.iter().any(|t| t.notched)
     }
 
-    /// The same with the tones free that have a notch, without it, and all others as they are.
-    pub(crate) fn without_notches(&self) -> Self {
-        let mut other = self.clone();
-        for tone in &mut other.tones {
+    /// Frees the tones that have a notch, without it; all others stay as they are.
+    pub(crate) fn free_notched(&mut self) {
+        for tone in &mut self.tones {
             tone.frozen = !tone.notched;
             tone.notched = false;
         }
-        other
+    }
+
+    /// No tones, and no drift yet.
+    pub(crate) fn clear(&mut self, drift_powers: usize) {
+        self.tones.clear();
+        (self.drift, self.drift_powers) = ([[0.0; 2]; 2], drift_powers);
+        self.squares = 0.0;
+    }
+
+    /// Becomes `other`, in place: a model is 1.7 KB, and a board's stack is short.
+    pub(crate) fn copy(&mut self, other: &Self) {
+        self.tones.clear();
+        // Both have the same room.
+        let _ = self.tones.extend_from_slice(&other.tones);
+        (self.drift, self.drift_powers) = (other.drift, other.drift_powers);
+        self.squares = other.squares;
     }
 
     /// Takes those tones over from `other`, which are free there.
@@ -87,7 +101,7 @@ pub(crate) struct Deviation {
 }
 
 /// Working memory of the fit.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Fit {
     normal: Normal,
     moments: [Moments; MAX_PEAKS],
@@ -142,31 +156,35 @@ impl Fit {
     /// Moves `model` to the least weighted sum of squares; leaves the tables and the normal matrix there.
     pub(crate) fn refine(&mut self, samples: &mut Samples<'_>, model: &mut Model, steps: u32) {
         let freedom = Self::freedom(samples, model).max(1.0);
-        let mut best: Option<Model> = None;
+        let Some(mut best) = samples.copy_of(model) else {
+            return;
+        };
+        // There is a step to go back from.
+        let mut stepped = false;
         let mut shorter = 1.0;
         let mut last_gain = f32::INFINITY;
         let mut current = false;
         for step in 0..=steps {
             let slow = self.evaluate(samples, model);
-            if let Some(best) = &best
+            let too_far = stepped
                 && model.squares.partial_cmp(&(best.squares * 1.0001))
-                    != Some(core::cmp::Ordering::Less)
-            {
-                // Too far: back, and half as far from there. The step is still in `unknowns`.
-                *model = best.clone();
+                    != Some(core::cmp::Ordering::Less);
+            if too_far {
+                // Back, and half as far from there. The step is still in `unknowns`.
+                model.copy(&best);
                 shorter *= 0.5;
                 if shorter < 0.1 || step == steps {
                     self.evaluate(samples, model);
                     return;
                 }
-                let regressors = Regressors::of(&model.tones, model.drift_powers, samples.axes);
-                self.apply(model, &regressors, shorter, samples.length_s);
-                continue;
-            }
-            if step == steps {
+            } else if step == steps {
                 return;
             }
             let regressors = Regressors::of(&model.tones, model.drift_powers, samples.axes);
+            if too_far {
+                self.apply(model, &regressors, shorter, samples.length_s);
+                continue;
+            }
             let settled = !model.tones.iter().any(|t| t.shape.is_zero());
             // Near the end the matrix hardly changes: it serves as long as each step gains much less than the one before.
             if !current {
@@ -195,7 +213,8 @@ impl Fit {
             current =
                 settled && gain < SOON * noise.max(1e-4 * last_gain) && gain < 0.1 * last_gain;
             last_gain = gain;
-            best = Some(model.clone());
+            best.copy(model);
+            stepped = true;
             shorter = 1.0;
             self.apply(model, &regressors, 1.0, samples.length_s);
         }

@@ -66,14 +66,14 @@ pub(crate) struct Noise {
 }
 
 impl Noise {
-    /// Nothing known.
+    /// Nothing measured yet: all zeros.
     pub(crate) const fn new() -> Self {
         Self {
             floor: Floor::new(),
             coarse: Floor::new(),
             images: Images::new(),
             white: 0.0,
-            freedom: 1.0,
+            freedom: 0.0,
         }
     }
 

@@ -58,6 +58,7 @@ mod timebase;
 mod tone;
 mod tones;
 mod window;
+mod workspace;
 
 pub use config::{Config, ConfigError};
 pub use estimator::Estimator;
@@ -67,5 +68,6 @@ pub use plan::{FrameRatePlan, PlanError};
 pub use storage::{EstimatorStorage, StaticCouplings, StaticStorage, Storage};
 pub use tones::Tones;
 pub use window::{FrameMark, SampleBuffer, SlotCoupling, WindowMark};
+pub use workspace::Workspace;
 
 pub(crate) use window::{follow_spread, pack_weight, skew_of};

@@ -3,9 +3,12 @@
 //! A *series* is one channel of one slot over the frames. Where the samples know one axis, a series is a slot. Where they know
 //! both there are twice as many: first those of the sums u + κ·v, then those of v alone, whose noise is independent.
 
+use core::cell::{RefCell, RefMut};
+
 use num_complex::Complex32 as Complex;
 
 use super::blur::blur;
+use super::fit::Model;
 use super::notch::{NOTCHES, Notch};
 use super::phase::Frequency;
 use super::rows;
@@ -92,6 +95,19 @@ pub(crate) struct Samples<'a> {
     pub(crate) count: u32,
     /// Length of the window, s.
     pub(crate) length_s: f32,
+    /// Models to try things on ([`Samples::copy_of`]).
+    pub(crate) spares: &'a [RefCell<Model>],
+}
+
+impl<'a> Samples<'a> {
+    /// A copy of a model in memory of the window's, until it is dropped; `None` where all spare ones are in use, which
+    /// [`SPARES`](super::workspace::SPARES) rules out.
+    pub(crate) fn copy_of(&self, model: &Model) -> Option<RefMut<'a, Model>> {
+        let mut spares = self.spares.iter();
+        let mut copy = spares.find_map(|spare| spare.try_borrow_mut().ok())?;
+        copy.copy(model);
+        Some(copy)
+    }
 }
 
 impl Samples<'_> {

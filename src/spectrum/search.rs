@@ -106,14 +106,14 @@ impl Search {
         residual: &mut Residual<'_>,
     ) -> Outcome {
         fit.passes = 0;
-        *model = Model::new(drift_powers(samples));
+        model.clear(drift_powers(samples));
         fit.refine(samples, model, 2);
         residual.leave_outliers_out(samples, model);
         // Where tones explain all but white noise, no floor is asked for.
         let mut outcome = self.search(samples, fit, model, residual);
         residual.look_all(samples, model);
         let hopeless = residual.is_hopeless();
-        plain.clone_from(model);
+        plain.copy(model);
         if !residual.is_white() || self.crowded(samples, model) {
             residual.begin_again();
             let rest = self.most_passes.saturating_sub(fit.passes);
@@ -125,16 +125,18 @@ impl Search {
         }
         fit.refine(samples, model, STEPS);
         if model.has_notches() {
-            let mut strong = model.without_notches();
-            fit.refine(samples, &mut strong, STEPS);
-            model.take_free(&strong);
+            if let Some(mut strong) = samples.copy_of(model) {
+                strong.free_notched();
+                fit.refine(samples, &mut strong, STEPS);
+                model.take_free(&strong);
+            }
             fit.refine(samples, model, STEPS);
         }
         if samples.frames < FEW_FRAMES {
             self.drop_drift(samples, fit, model);
         }
         if hopeless || !residual.is_strict() {
-            plain.clone_from(model);
+            plain.copy(model);
         }
         outcome
     }
@@ -148,7 +150,7 @@ impl Search {
         residual: &mut Residual<'_>,
     ) -> Outcome {
         let mut outcome = Outcome::default();
-        *model = Model::new(drift_powers(samples));
+        model.clear(drift_powers(samples));
         fit.refine(samples, model, 2);
         // Each round adds, exchanges or drops a tone; the bound only guards against going round in circles.
         for _ in 0..3 * self.most_tones + 3 {
@@ -192,13 +194,15 @@ impl Search {
     fn drop_drift(&self, samples: &mut Samples<'_>, fit: &mut Fit, model: &mut Model) {
         let freedom = Fit::freedom(samples, model).max(1.0);
         for powers in 0..model.drift_powers {
-            let mut trial = model.clone();
+            let Some(mut trial) = samples.copy_of(model) else {
+                break;
+            };
             trial.drift_powers = powers;
             trial.drift = [[0.0; 2]; 2];
             fit.refine(samples, &mut trial, STEPS);
             let worse = (trial.squares - model.squares) / model.squares * freedom;
             if worse < DRIFT_SEEN && self.sound(samples, &trial) {
-                *model = trial;
+                model.copy(&trial);
                 return;
             }
         }
@@ -266,7 +270,9 @@ impl Search {
                 return false;
             }
             let before = barred.places.len();
-            let mut best = model.clone();
+            let Some(mut best) = samples.copy_of(model) else {
+                return false;
+            };
             if self.put_best(samples, fit, model, &mut best, &candidates, &mut barred) {
                 if model.squares - best.squares < 2.0 * share * best.squares {
                     // Tones near each other are slow to settle: what they gain by it is not the new one's.
@@ -286,7 +292,7 @@ impl Search {
                         let at = newest.frequency;
                         self.modulate(samples, fit, model, Some(&mut best), at, 0.0);
                     }
-                    *model = best;
+                    model.copy(&best);
                     return true;
                 }
                 if white || residual.refuse() || barred.places.push(first).is_err() {
@@ -373,12 +379,14 @@ impl Search {
                 if self.tired(fit) {
                     return found;
                 }
-                let mut trial = model.clone();
+                let Some(mut trial) = samples.copy_of(model) else {
+                    return found;
+                };
                 let start = Tone::steady(at, candidate.axis);
                 if self.put(samples, fit, &mut trial, start) {
                     put = true;
                     if !found || trial.squares < best.squares {
-                        *best = trial;
+                        best.copy(&trial);
                         found = true;
                     }
                 }
@@ -463,7 +471,6 @@ impl Search {
     /// A tone that changes within the window has others beside it in a steady model. Where what is `beside` is near a
     /// larger tone, and that one's frequency and amplitude changing instead lowers the sum of squares by more than `share`,
     /// this is what `with` becomes: the model with a further tone there. Without one, where none could be put, `model` does.
-    /// (In its place: a model is half a kilobyte, and a board's stack is short.)
     fn modulate(
         &self,
         samples: &mut Samples<'_>,
@@ -493,7 +500,9 @@ impl Search {
             if self.tired(fit) {
                 break;
             }
-            let mut trial = model.clone();
+            let Some(mut trial) = samples.copy_of(model) else {
+                break;
+            };
             match trial.tones.get_mut(i) {
                 Some(tone) if tone.frozen => break,
                 Some(tone) if !tone.modulated && chirp == 0.0 => tone.modulated = true,
@@ -516,7 +525,7 @@ impl Search {
             if stayed && to_beat - trial.squares > share * trial.squares {
                 let sound = self.sound(samples, &trial);
                 if sound {
-                    *with.unwrap_or(model) = trial;
+                    with.unwrap_or(model).copy(&trial);
                 }
                 return sound;
             }
@@ -562,10 +571,14 @@ impl Search {
                 continue;
             };
             let ghosts = self.ghosts(samples, fit, model, i, fps);
-            let mut without = model.clone();
+            let Some(mut without) = samples.copy_of(model) else {
+                break;
+            };
             without.tones.swap_remove(i);
             for candidate in &ghosts {
-                let mut trial = without.clone();
+                let Some(mut trial) = samples.copy_of(&without) else {
+                    break;
+                };
                 if self.put(
                     samples,
                     fit,
@@ -573,7 +586,7 @@ impl Search {
                     Tone::steady(candidate.frequency, axis),
                 ) && trial.squares < 0.9999 * model.squares
                 {
-                    *model = trial;
+                    model.copy(&trial);
                     changed = true;
                     break;
                 }
@@ -592,7 +605,9 @@ impl Search {
         fps: f32,
     ) -> heapless::Vec<Candidate, { GHOSTS.len() }> {
         let mut ghosts = heapless::Vec::new();
-        let mut probes = model.clone();
+        let Some(mut probes) = samples.copy_of(model) else {
+            return ghosts;
+        };
         let Some(tone) = probes.tones.get_mut(i) else {
             return ghosts;
         };

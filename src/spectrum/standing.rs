@@ -101,7 +101,9 @@ impl Search {
         let unsure = second.is_some_and(|s| {
             s.value > ALIKE * best.value && best.value - s.value < APART * variance
         });
-        let mut trial = model.clone();
+        let Some(mut trial) = samples.copy_of(model) else {
+            return false;
+        };
         if let Some(tone) = trial.tones.get_mut(i) {
             tone.shape = shape;
             tone.frequency = at;
@@ -129,7 +131,7 @@ impl Search {
         {
             return false;
         }
-        *model = trial;
+        model.copy(&trial);
         true
     }
 
@@ -189,7 +191,9 @@ impl Search {
         (shaped, axes): (&Model, [bool; 2]),
         variance: f32,
     ) -> bool {
-        let mut two = model.clone();
+        let Some(mut two) = samples.copy_of(model) else {
+            return false;
+        };
         let rigid = |at: Frequency| {
             let at = if at.hz() < 0.0 { at.mirrored() } else { at };
             Tone {

@@ -1,6 +1,7 @@
 //! The memory that the collecting and the computing side work in, lent by the caller.
 
 use super::window::{FrameMark, SampleBuffer, SlotCoupling};
+use super::workspace::Workspace;
 use crate::timeline::{Spread, Tally};
 
 /// Rows of [`EstimatorStorage::frame_rows`]: time, weight and four of scratch.
@@ -34,6 +35,8 @@ pub struct EstimatorStorage<'a> {
     pub slot_phasors: &'a mut [f32],
     /// The transform's grid: 64 to 32 768 points, the largest power of two that fits is used.
     pub grid: &'a mut [f32],
+    /// Models, normal matrix, noise.
+    pub workspace: &'a mut Workspace,
 }
 
 /// All that an [`crate::pipeline::ReportSide`] works in.
@@ -47,13 +50,15 @@ pub struct Storage<'a> {
 
 /// Arrays of fixed size for [`Storage`]: a `static` on a microcontroller, a local in a test.
 ///
-/// `ROWS` is the most tones fitted at once, and one. `StaticStorage<4096, 96, 96, 8192, 13>` takes about 130 KiB: twice
-/// 32 KiB of samples, 32 KiB of grid, the rest tables.
+/// `ROWS` is the most tones fitted at once, and one. `StaticStorage<4096, 96, 96, 8192, 13>` takes about 155 KiB: twice
+/// 32 KiB of samples, 32 KiB of grid, 27 KiB of [`Workspace`] (with `many-unknowns` 50 more), the rest tables.
 ///
 /// ```
 /// use rowtone::spectrum::StaticStorage;
 /// let mut storage = Box::new(StaticStorage::<4096, 96, 96, 8192, 9>::new());
-/// assert!(core::mem::size_of_val(&*storage) < 128 * 1024);
+/// let fit = core::mem::size_of::<rowtone::spectrum::Workspace>();
+/// assert!(core::mem::size_of_val(&*storage) < 128 * 1024 + fit);
+/// assert!(fit < if cfg!(feature = "many-unknowns") { 76 } else { 28 } * 1024);
 /// let storage = storage.lend();
 /// assert_eq!(storage.estimator.grid.len(), 8192);
 /// ```
@@ -77,6 +82,7 @@ pub struct StaticStorage<
     frame_phasors: [[[f32; FRAMES]; 2]; ROWS],
     slot_phasors: [[[f32; SLOTS]; 2]; ROWS],
     grid: [f32; GRID],
+    workspace: Workspace,
 }
 
 impl<
@@ -109,6 +115,7 @@ impl<
             frame_phasors: [[[0.0; FRAMES]; 2]; ROWS],
             slot_phasors: [[[0.0; SLOTS]; 2]; ROWS],
             grid: [0.0; GRID],
+            workspace: Workspace::new(),
         }
     }
 
@@ -144,6 +151,7 @@ impl<
                 frame_phasors: self.frame_phasors.as_flattened_mut().as_flattened_mut(),
                 slot_phasors: self.slot_phasors.as_flattened_mut().as_flattened_mut(),
                 grid: &mut self.grid,
+                workspace: &mut self.workspace,
             },
         }
     }

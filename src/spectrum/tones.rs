@@ -145,8 +145,10 @@ impl Telling<'_> {
         tones.noise_floor = residual.noise(0).points(self.band.highest_hz, density);
         tones.other_px_rms = residual.noise(0).other_px_rms();
         self.tell(samples, fit, (model, residual), &smear, (&mut list, shapes));
-        if model.has_notches() {
-            let mut strong = model.without_notches();
+        if model.has_notches()
+            && let Some(mut strong) = samples.copy_of(model)
+        {
+            strong.free_notched();
             fit.evaluate(samples, &mut strong);
             self.tell(
                 samples,
@@ -188,7 +190,9 @@ impl Telling<'_> {
         tones: &mut Tones,
     ) {
         let Some(fps) = self.band.fps else { return };
-        let mut plain = model.clone();
+        let Some(mut plain) = samples.copy_of(model) else {
+            return;
+        };
         for tone in &mut plain.tones {
             tone.notched = false;
         }

@@ -1,7 +1,9 @@
 //! The spectrum's memory.
 
 use rowtone::report::MAX_PEAKS;
-use rowtone::spectrum::{EstimatorStorage, FrameMark, SampleBuffer, SlotCoupling, Storage};
+use rowtone::spectrum::{
+    EstimatorStorage, FrameMark, SampleBuffer, SlotCoupling, Storage, Workspace,
+};
 use rowtone::timeline::{Group, Spread};
 use rowtone::tracker::Axes;
 
@@ -28,6 +30,7 @@ pub struct SpectrumMemory {
     frame_phasors: Vec<f32>,
     slot_phasors: Vec<f32>,
     grid: Vec<f32>,
+    workspace: Box<Workspace>,
 }
 
 #[derive(Clone, Debug)]
@@ -95,6 +98,7 @@ impl SpectrumMemory {
             frame_phasors: vec![0.0; 2 * rows * frames],
             slot_phasors: vec![0.0; 2 * rows * slots],
             grid: vec![0.0; GRID],
+            workspace: Box::default(),
         }
     }
 
@@ -112,6 +116,7 @@ impl SpectrumMemory {
                 frame_phasors: &mut self.frame_phasors,
                 slot_phasors: &mut self.slot_phasors,
                 grid: &mut self.grid,
+                workspace: &mut self.workspace,
             },
         }
     }
