@@ -68,7 +68,7 @@ pub(crate) fn reports() -> Result<(Vec<Report>, u32), Box<dyn std::error::Error>
                     start_ns,
                     pixels: Pixels::U8(&pixels),
                 };
-                let Some(reading) = lines.push(&line) else {
+                let Some(&reading) = lines.push(&line) else {
                     continue;
                 };
                 if !collector.push(reading) {

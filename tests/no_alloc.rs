@@ -150,7 +150,7 @@ fn nothing_is_allocated_from_lines_to_bytes() {
                         };
                         whole.lines.bin(displacement)
                     } else {
-                        whole.lines.push(&line)
+                        whole.lines.push(&line).copied()
                     };
                     let Some(reading) = reading else {
                         continue;

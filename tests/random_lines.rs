@@ -166,7 +166,7 @@ proptest! {
                     prop_assert!(v.shift_px.is_finite() && v.coupling.is_finite(), "{d:?}");
                     lines.bin(d)
                 } else {
-                    lines.push(&line)
+                    lines.push(&line).copied()
                 };
                 let Some(reading) = reading else { continue };
                 if dice.below(100) == 0 {

@@ -31,6 +31,8 @@ pub struct LineSide<'a> {
     tally: Tally,
     ended: u32,
     tally_waits: bool,
+    /// The last reading that [`LineSide::push`] gave.
+    ready: Reading,
 }
 
 impl<'a> LineSide<'a> {
@@ -52,6 +54,11 @@ impl<'a> LineSide<'a> {
             tally: Tally::NONE,
             ended: 0,
             tally_waits: false,
+            ready: Reading {
+                sample: None,
+                tally: Tally::NONE,
+                frame: 0,
+            },
         })
     }
 
@@ -62,21 +69,21 @@ impl<'a> LineSide<'a> {
         self
     }
 
-    /// Takes one line; gives what the group of rows before it measured, where this line begins another.
+    /// Takes one line; gives what the group of rows before it measured, where this line begins another. (Lent, so that it
+    /// is moved but once, to where the caller wants it.)
     #[inline(always)]
-    pub fn push(&mut self, line: &Line<'_>) -> Option<Reading> {
+    pub fn push(&mut self, line: &Line<'_>) -> Option<&Reading> {
         self.note_line(line);
-        // Made in place: moving a sample about takes a microcontroller as long as a part of a line.
-        let mut reading = Reading {
-            sample: self.tracker.push_into(line, &mut self.binner),
-            tally: Tally::NONE,
-            frame: line.frame,
-        };
-        reading.sample.as_ref()?;
-        if self.tally_waits {
-            self.take_tally(&mut reading);
+        // Most lines end here: nothing of a reading is written for them.
+        let done = &mut self.ready.sample;
+        if !self.tracker.push_into(line, &mut self.binner, done) {
+            return None;
         }
-        Some(reading)
+        (self.ready.tally, self.ready.frame) = match self.tally_waits {
+            true => self.take_tally(),
+            false => (Tally::NONE, line.frame),
+        };
+        Some(&self.ready)
     }
 
     /// Takes one line and gives what became of it, for callers that want every row; nothing goes to the binner. What
@@ -122,13 +129,12 @@ impl<'a> LineSide<'a> {
     /// What no reading has taken along: after the last sample of the input, for [`super::Collector::push`].
     pub fn rest(&mut self) -> Reading {
         self.end_frame();
-        let mut reading = Reading {
+        let (tally, frame) = self.take_tally();
+        Reading {
             sample: None,
-            tally: Tally::NONE,
-            frame: self.ended,
-        };
-        self.take_tally(&mut reading);
-        reading
+            tally,
+            frame,
+        }
     }
 
     /// The tracker.
@@ -216,15 +222,18 @@ impl<'a> LineSide<'a> {
     }
 
     fn read(&mut self, sample: Sample) -> Reading {
-        let mut reading = Reading::from(sample);
-        self.take_tally(&mut reading);
-        reading
+        let (tally, frame) = self.take_tally();
+        Reading {
+            sample: Some(sample),
+            tally,
+            frame,
+        }
     }
 
+    /// What became of the rows of the frames that ended, and the number of the last.
     #[inline(never)]
-    fn take_tally(&mut self, reading: &mut Reading) {
-        reading.tally = core::mem::take(&mut self.tally);
-        reading.frame = self.ended;
+    fn take_tally(&mut self) -> (Tally, u32) {
         self.tally_waits = false;
+        (core::mem::take(&mut self.tally), self.ended)
     }
 }

@@ -68,7 +68,7 @@ impl<'a> Pipeline<'a> {
 
     /// Takes a line; gives the report of the window that ended before it, where one did.
     pub fn push(&mut self, line: &Line<'_>) -> Option<Report> {
-        let reading = self.lines.push(line)?;
+        let reading = *self.lines.push(line)?;
         let complete = self.reports.push(reading);
         complete.then(|| self.reports.report()).flatten()
     }

@@ -188,7 +188,8 @@ impl Binner {
             to_reference: 1.0,
             anchor_px: 0.0,
         };
-        let done = self.push_row(row, || begin);
+        let mut done = None;
+        self.push_row(row, || begin, &mut done);
         let place = self.group.timing().start_ns(d.row - self.open.first_row);
         let later_ns = d
             .time_ns
@@ -201,13 +202,19 @@ impl Binner {
     }
 
     /// [`Binner::push`] for a row of this timing that is exposed when its place says. `begin` is asked where a group
-    /// begins.
+    /// begins. Says whether the group before is complete, which is in `done` then (written there, not moved about: that would
+    /// take a microcontroller as long as a part of a line).
     #[inline(always)]
-    pub(crate) fn push_row(&mut self, row: RowShift, begin: impl Fn() -> Begin) -> Option<Sample> {
+    pub(crate) fn push_row(
+        &mut self,
+        row: RowShift,
+        begin: impl Fn() -> Begin,
+        done: &mut Option<Sample>,
+    ) -> bool {
         let open = &mut self.open;
         if row.row == open.next_row && row.row < open.end_row && row.frame == open.frame {
             open.add(row);
-            return None;
+            return false;
         }
         let RowShift {
             frame,
@@ -215,7 +222,7 @@ impl Binner {
             shift_px,
             information_per_px2,
         } = row;
-        self.push_elsewhere(frame, row, shift_px, information_per_px2, begin())
+        self.push_elsewhere((frame, row), shift_px, information_per_px2, &begin(), done)
     }
 
     /// The row pushed last was exposed so much later than its place says, ns.
@@ -248,12 +255,12 @@ impl Binner {
     #[inline(never)]
     fn push_elsewhere(
         &mut self,
-        frame: u32,
-        row: u16,
+        (frame, row): (u32, u16),
         shift_px: f32,
         information_per_px2: f32,
-        begin: Begin,
-    ) -> Option<Sample> {
+        begin: &Begin,
+        done: &mut Option<Sample>,
+    ) -> bool {
         // One by one, or every row would be written to memory for the sake of those that come here.
         let row = RowShift {
             frame,
@@ -264,31 +271,31 @@ impl Binner {
         // The next group's first row: most come so.
         let follows = frame == self.open.frame && row.row == self.open.end_row && row.row > 0;
         if !follows {
-            return self.push_far(row, begin);
+            return self.push_far(row, begin, done);
         }
         self.settle_lateness(&row, begin.to_reference);
-        let done = self.close();
+        *done = self.close();
         let open = &mut self.open;
         open.slot += 1;
         open.first_row = row.row;
         open.missing = 0;
         open.first_ns = begin.middle_ns;
-        self.open_with(row, &begin);
-        done
+        self.open_with(row, begin);
+        done.is_some()
     }
 
     /// A row that is neither the next of its group nor the first of the next group.
     #[inline(never)]
-    fn push_far(&mut self, row: RowShift, begin: Begin) -> Option<Sample> {
+    fn push_far(&mut self, row: RowShift, begin: &Begin, done: &mut Option<Sample>) -> bool {
         if self.is_open_for(row.frame, row.row) {
             if row.row >= self.open.next_row {
                 self.open.skip_to(row.row);
                 self.open.add(row);
             }
-            return None;
+            return false;
         }
         self.settle_lateness(&row, begin.to_reference);
-        let done = self.finish();
+        *done = self.close();
         if self.open.frame != row.frame || self.last_frame.is_none() {
             self.count_lost(row.frame);
             self.late_ns = 0.0;
@@ -304,8 +311,8 @@ impl Binner {
             let before_ns = self.group.timing().start_ns(open.missing);
             open.first_ns = begin.middle_ns.saturating_sub(before_ns);
         }
-        self.open_with(row, &begin);
-        done
+        self.open_with(row, begin);
+        done.is_some()
     }
 
     /// The rest of what begins a group.
@@ -500,7 +507,9 @@ mod tests {
                     shift_px: 0.5,
                     information_per_px2: 1.0,
                 };
-                samples.extend(binner.push_row(row, || begin));
+                let mut done = None;
+                binner.push_row(row, || begin, &mut done);
+                samples.extend(done);
             }
         }
         samples.extend(binner.finish());

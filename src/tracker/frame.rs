@@ -58,7 +58,9 @@ impl Tracker<'_> {
         #[cfg(feature = "long-exposure")]
         self.look_ahead();
         self.check.begin_frame(frame);
-        self.planar.begin_frame();
+        if self.store.is_planar() {
+            self.planar.begin_frame();
+        }
         self.schedule.next_check = 0;
         self.schedule.background = self.store.is_busy() || self.check.is_searching();
         self.light.begin_frame();

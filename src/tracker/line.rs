@@ -5,7 +5,7 @@
 //! path goes. Any other line, and one that turns out to be unlike them, takes the slow path.
 
 use super::{
-    Stage, Tracker,
+    Bins, Stage, Tracker,
     correlate::{Sums, Unfound, whole_sums},
     predict::Prediction,
     print,
@@ -18,7 +18,6 @@ use crate::{
     camera::{Line, UpperBytes},
     kernel,
     reference::RowTable,
-    timeline::{Binner, Sample},
 };
 
 /// A line that was checked and is further than this from where it was expected has jumped, px.
@@ -107,18 +106,18 @@ impl Tracker<'_> {
         line: &Line<'_>,
         upper: &UpperBytes<'_>,
         sums: Sums,
-        binner: &mut Binner,
-    ) -> Option<Sample> {
+        to: Bins<'_>,
+    ) -> bool {
         let room = core::mem::take(&mut self.room);
-        let sample = match Scattered::new(*upper, self.config.kernel, &mut *room) {
-            Some(row) => self.take_otherwise_into(line, row, sums, binner),
+        let complete = match Scattered::new(*upper, self.config.kernel, &mut *room) {
+            Some(row) => self.take_otherwise_into(line, row, sums, to),
             None => {
                 self.misfit();
-                None
+                false
             }
         };
         self.room = room;
-        sample
+        complete
     }
 
     /// Takes a line that was not on the fast path; apart from those that are, so that their outcome stays in registers.
@@ -146,20 +145,23 @@ impl Tracker<'_> {
         line: &Line<'_>,
         mut pixels: R,
         sums: Sums,
-        binner: &mut Binner,
-    ) -> Option<Sample> {
+        to: Bins<'_>,
+    ) -> bool {
         if self.take_fast_planar(line, &pixels, false).is_some() {
             self.work_after_fast::<R::P>(line);
-            return self.pass_on_planar(line, binner);
+            return self.pass_on_planar(line, to);
         }
         let place = match self.take_with_background(line, &mut pixels, sums, false) {
             Ok(place) => place,
-            Err(sums) => self.take_slow(line, pixels, sums).ok()?,
+            Err(sums) => match self.take_slow(line, pixels, sums) {
+                Ok(place) => place,
+                Err(_) => return false,
+            },
         };
         if self.store.is_planar() {
-            return self.pass_on_planar(line, binner);
+            return self.pass_on_planar(line, to);
         }
-        self.pass_on(line, place, self.curvature(), binner)
+        self.pass_on(line, place, self.curvature(), to)
     }
 
     /// What every line takes. Nothing has changed where it is refused. `times`: how late it was exposed is asked
@@ -558,16 +560,20 @@ impl Tracker<'_> {
         if !self.copies.may_be() {
             return false;
         }
-        if before == 0 {
-            // The row was built again meanwhile.
+        let read_otherwise = print::is_by_pixels(before) != by_sums.is_none();
+        if before == 0 || read_otherwise && self.is_hurried() {
+            // The row was built again meanwhile, or there is no time to read it the other way: the next row tells.
             return self.copies.seems();
         }
         // The row of the frame before may have been read the other way.
         let repeated = before == print
             || match by_sums {
-                Some(_) => before == print::of_pixels(pixels.pixels()),
+                Some(_) => read_otherwise && before == print::of_pixels(pixels.pixels()),
                 None => {
-                    let sums = whole_sums(&self.store, row, pixels);
+                    let sums = match read_otherwise {
+                        true => whole_sums(&self.store, row, pixels),
+                        false => None,
+                    };
                     sums.is_some_and(|sums| before == print::of_sums(sums))
                 }
             };

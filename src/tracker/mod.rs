@@ -60,6 +60,9 @@ use row::Row;
 use schedule::Schedule;
 use vetting::Vetting;
 
+/// Where the shifts of rows go, and where the group before them goes when it is complete.
+type Bins<'b> = (&'b mut Binner, &'b mut Option<Sample>);
+
 /// The outcome of a line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Outcome {
@@ -233,14 +236,19 @@ impl<'a> Tracker<'a> {
         }
     }
 
-    /// Takes one line and passes what it measures on to `binner`: a group of rows that is complete. As
-    /// [`Tracker::push`] and [`Binner::push`] one after the other, in fewer instructions.
+    /// Takes one line and passes what it measures on to `binner`. Says whether the group of rows before it is complete, which
+    /// is in `done` then. As [`Tracker::push`] and [`Binner::push`] one after the other, in fewer instructions.
     #[inline(always)]
-    pub fn push_into(&mut self, line: &Line<'_>, binner: &mut Binner) -> Option<Sample> {
+    pub fn push_into(
+        &mut self,
+        line: &Line<'_>,
+        binner: &mut Binner,
+        done: &mut Option<Sample>,
+    ) -> bool {
         match line.pixels {
-            Pixels::U8(p) => self.push_u8_into(line, p, binner),
-            Pixels::U16(p) => self.push_u16_into(line, p, binner),
-            Pixels::Upper(ref p) => self.push_upper_into(line, p, binner),
+            Pixels::U8(p) => self.push_u8_into(line, p, (binner, done)),
+            Pixels::U16(p) => self.push_u16_into(line, p, (binner, done)),
+            Pixels::Upper(ref p) => self.push_upper_into(line, p, (binner, done)),
         }
     }
 
@@ -258,13 +266,13 @@ impl<'a> Tracker<'a> {
     }
 
     #[inline(never)]
-    fn push_u8_into(&mut self, line: &Line<'_>, p: &[u8], binner: &mut Binner) -> Option<Sample> {
-        self.take_into(line, p, binner)
+    fn push_u8_into(&mut self, line: &Line<'_>, p: &[u8], to: Bins<'_>) -> bool {
+        self.take_into(line, p, to)
     }
 
     #[inline(never)]
-    fn push_u16_into(&mut self, line: &Line<'_>, p: &[u16], binner: &mut Binner) -> Option<Sample> {
-        self.take_into(line, p, binner)
+    fn push_u16_into(&mut self, line: &Line<'_>, p: &[u16], to: Bins<'_>) -> bool {
+        self.take_into(line, p, to)
     }
 
     #[inline(never)]
@@ -274,30 +282,20 @@ impl<'a> Tracker<'a> {
     }
 
     #[inline(never)]
-    fn push_upper_into(
-        &mut self,
-        line: &Line<'_>,
-        pixels: &UpperBytes<'_>,
-        binner: &mut Binner,
-    ) -> Option<Sample> {
+    fn push_upper_into(&mut self, line: &Line<'_>, pixels: &UpperBytes<'_>, to: Bins<'_>) -> bool {
         match self.take_fast(line, pixels, false) {
             // At rest, so not swift.
-            Ok(place) => self.pass_on(line, place, self.curvature, binner),
-            Err(sums) => self.take_scattered_otherwise_into(line, pixels, sums, binner),
+            Ok(place) => self.pass_on(line, place, self.curvature, to),
+            Err(sums) => self.take_scattered_otherwise_into(line, pixels, sums, to),
         }
     }
 
     #[inline(always)]
-    fn take_into<R: Row>(
-        &mut self,
-        line: &Line<'_>,
-        pixels: R,
-        binner: &mut Binner,
-    ) -> Option<Sample> {
+    fn take_into<R: Row>(&mut self, line: &Line<'_>, pixels: R, to: Bins<'_>) -> bool {
         match self.take_fast(line, &pixels, false) {
             // At rest, so not swift.
-            Ok(place) => self.pass_on(line, place, self.curvature, binner),
-            Err(sums) => self.take_otherwise_into(line, pixels, sums, binner),
+            Ok(place) => self.pass_on(line, place, self.curvature, to),
+            Err(sums) => self.take_otherwise_into(line, pixels, sums, to),
         }
     }
 
@@ -334,8 +332,8 @@ impl<'a> Tracker<'a> {
         line: &Line<'_>,
         place: Place,
         curvature: Curvature,
-        binner: &mut Binner,
-    ) -> Option<Sample> {
+        (binner, done): Bins<'_>,
+    ) -> bool {
         let Place {
             shift_px,
             information_per_px2,
@@ -346,12 +344,13 @@ impl<'a> Tracker<'a> {
             shift_px,
             information_per_px2,
         };
-        binner.push_row(row, || Begin {
+        let begin = || Begin {
             middle_ns: self.middle_ns(line),
             curvature,
             to_reference: self.light.to_reference,
             anchor_px: self.store.anchor_px(),
-        })
+        };
+        binner.push_row(row, begin, done)
     }
 
     /// Middle of a line's exposure, ns on the camera's clock.

@@ -10,7 +10,7 @@
 //! texture of no preferred direction answers to both shifts as if it were weakened by 1 − (b_x·x² + b_y·y²), b = curvature/6, along either axis (an isotropic spectrum's fourth moments: ⟨k_x⁴⟩ = 3⟨k_x²·k_y²⟩).
 
 use super::{
-    Place, Rejected, Tracker,
+    Bins, Place, Rejected, Tracker,
     correlate::whole_sums,
     overlap::{Overlap, nearest_step},
     predict::Prediction,
@@ -24,7 +24,7 @@ use crate::{
     camera::Line,
     camera::pixel::Pixel,
     reference::{RowTable, VerticalTable, at_least_1},
-    timeline::{Begin, Binner, Displacement, RowShift, Sample, Vertical},
+    timeline::{Begin, Displacement, RowShift, Vertical},
 };
 
 /// Weight of what was known of the motion along the columns a row ago.
@@ -467,7 +467,7 @@ impl Tracker<'_> {
 
     /// Passes the line that was measured last on.
     #[inline(always)]
-    pub(super) fn pass_on_planar(&self, line: &Line<'_>, binner: &mut Binner) -> Option<Sample> {
+    pub(super) fn pass_on_planar(&self, line: &Line<'_>, (binner, done): Bins<'_>) -> bool {
         let Place {
             shift_px,
             information_per_px2,
@@ -478,13 +478,14 @@ impl Tracker<'_> {
             shift_px,
             information_per_px2,
         };
-        let done = binner.push_row(row, || Begin {
+        let begin = || Begin {
             middle_ns: self.middle_ns(line),
             curvature: self.curvature(),
             to_reference: self.light.to_reference,
             anchor_px: self.store.anchor_px(),
-        });
+        };
+        let complete = binner.push_row(row, begin, done);
         binner.note_vertical(row, &self.planar.vertical);
-        done
+        complete
     }
 }

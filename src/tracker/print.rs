@@ -10,19 +10,31 @@ use crate::camera::pixel::Pixel;
 /// Pixels of a line that a print is made of.
 const PIXELS: usize = 16;
 
+/// Tells how a print was made.
+const BY_PIXELS: u32 = 1;
+
 /// The print of a line by Σ h·p and Σ p.
 #[inline(always)]
 pub(super) fn of_sums((product, pixels): (f32, f32)) -> u32 {
-    product.to_bits() ^ pixels.to_bits().rotate_left(16)
+    (product.to_bits() ^ pixels.to_bits().rotate_left(16)) & !BY_PIXELS
+}
+
+/// The print was made of some pixels.
+#[inline(always)]
+pub(super) fn is_by_pixels(print: u32) -> bool {
+    print & BY_PIXELS != 0
 }
 
 /// The print of a line by some of its pixels (FNV-1a, Fowler, Noll and Vo).
 pub(super) fn of_pixels<P: Pixel>(pixels: &[P]) -> u32 {
     let step = (pixels.len() / PIXELS).max(1);
-    let some = pixels.iter().step_by(step);
-    some.fold(0x811C_9DC5, |print, p| {
-        (print ^ u32::from(p.value())).wrapping_mul(0x0100_0193)
-    })
+    let (mut print, mut next) = (0x811C_9DC5_u32, 0);
+    // Half the instructions of `step_by`.
+    while let Some(p) = pixels.get(next) {
+        print = (print ^ u32::from(p.value())).wrapping_mul(0x0100_0193);
+        next += step;
+    }
+    print | BY_PIXELS
 }
 
 /// What the rows of a frame say of its being a copy.

@@ -96,9 +96,8 @@ impl Residual {
                 break;
             };
             let (left, here, right) = (f32::from(left), f32::from(here), f32::from(right));
-            if mask == 0 || here >= saturation {
-                continue;
-            }
+            // No branch: what is not used has no weight. (With one, compilers write the search for the next used column out.)
+            let used = mask != 0 && here < saturation;
             let slope = right - left;
             let bend = right + left - 2.0 * here;
             let mut model = here - 0.5 * near * (slope - near * bend);
@@ -107,12 +106,12 @@ impl Residual {
             }
             let value = f32::from(p.value());
             let variance = r.noise.dark + per_count * here;
-            let weight = 1.0
-                / if variance > LEAST_VARIANCE {
-                    variance
-                } else {
-                    LEAST_VARIANCE
-                };
+            let variance = if variance > LEAST_VARIANCE {
+                variance
+            } else {
+                LEAST_VARIANCE
+            };
+            let weight = if used { 1.0 / variance } else { 0.0 };
             if SHADED {
                 if x >= part_end {
                     power += core::mem::take(&mut part).residual(gain);
@@ -125,7 +124,7 @@ impl Residual {
                 power += residual * residual * weight;
             }
             slopes += slope * slope * weight;
-            read += 1;
+            read += u16::from(used);
         }
         if SHADED {
             power += part.residual(gain);

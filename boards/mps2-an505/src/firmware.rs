@@ -172,6 +172,7 @@ impl Board<'_> {
             if let (Some(counter), Some(start)) = (&self.counter, start) {
                 self.per_line.add(counter.instructions(start));
             }
+            let reading = reading.copied();
             self.collect(reading);
         }
         let last = self.side.finish();

@@ -193,7 +193,7 @@ fn core_alone(setup: &Setup, frames: &[(i64, Vec<u8>)], rounds: usize) -> Best {
                     start_ns: start_ns + timing.start_ns(row),
                     pixels,
                 };
-                if let Some(reading) = lines.push(&line) {
+                if let Some(&reading) = lines.push(&line) {
                     collector.push(reading);
                 }
             }

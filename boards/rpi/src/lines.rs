@@ -152,7 +152,7 @@ impl<'a> Lines<'a> {
                 pixels,
             };
             rest = rest.get(shape.stride..).unwrap_or_default();
-            let Some(reading) = self.lines.push(&line) else {
+            let Some(&reading) = self.lines.push(&line) else {
                 continue;
             };
             if let (true, Some(sample)) = (self.shown, &reading.sample) {

@@ -73,5 +73,5 @@ fn measure(buffer: &LineBuffer, plan: &Plan, lines: &mut LineSide<'_>) -> Option
     let line = plan
         .cut
         .line(place.frame, place.frame_start_ns, place.row, pixels)?;
-    lines.push(&line)
+    lines.push(&line).copied()
 }

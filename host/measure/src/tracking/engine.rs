@@ -124,7 +124,7 @@ impl<'a> Engine<'a> {
     /// Measures every line of a frame, and hands what comes of its groups of rows to `take`.
     pub fn measure_into(&mut self, frame: &Frame, mut take: impl FnMut(Reading)) {
         for line in frame.lines(&self.part, &self.timing, self.rows.clone()) {
-            if let Some(reading) = self.lines.push(&line) {
+            if let Some(&reading) = self.lines.push(&line) {
                 take(reading);
             }
         }
