@@ -4,8 +4,8 @@
     boards/stack.py ELF NAME...
 
 NAME is a part of a mangled name. Each function's pushed words and `sub sp` are summed over what it calls; the path is
-printed with -v first. A call through a pointer in embassy may reach every waker, elsewhere every function
-of formatting and writing, that nobody calls by name. Functions that reach each other count once each, all together.
+printed with -v first. A call through a pointer in embassy and in an interrupt may reach every waker (the tasks that an
+interrupt polls are to be asked for by name), elsewhere every function of formatting and writing, that nobody calls by name. Functions that reach each other count once each, all together.
 What only a panic runs is left out: ask for rust_begin_unwind. The words that the
 processor pushes for an interrupt come on top (104 bytes with floating point).
 """
@@ -69,7 +69,8 @@ def main():
     writers = {f for f in free if re.search(r"3fmt|5Write", f)} - wakers
     edges = {}
     for name in frames:
-        by_pointer = (wakers if "embassy" in name else writers) if name in pointer else set()
+        asynchronous = "embassy" in name or re.search(r"_IRQ", name)
+        by_pointer = (wakers if asynchronous else writers) if name in pointer else set()
         edges[name] = sorted(f for f in calls[name] | by_pointer if f in frames and not PANIC.search(f))
 
     # Functions that reach each other count together, all their frames: no order of them takes more.

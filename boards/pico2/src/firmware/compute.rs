@@ -2,6 +2,7 @@
 
 use super::shared::{DROPPED_WINDOWS, M, PLAN};
 use core::cell::RefCell;
+use core::future::poll_fn;
 use embassy_futures::select::{Either, select};
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::channel::Channel;
@@ -113,7 +114,15 @@ pub(crate) async fn compute(mut reporter: &'static mut Reporter<'static>) {
     loop {
         let _ = IDLE.try_send(reporter);
         reporter = LOADED.receive().await;
-        let report = reporter.report();
-        REPORTS.send(report).await;
+        poll_fn(|context| REPORTS.poll_ready_to_send(context)).await;
+        tell(reporter);
     }
+}
+
+/// Computes a window, for whose report there is room. Not inlined: reports are 1.8 KB, and the task would keep room for
+/// its copies while it computes.
+#[inline(never)]
+fn tell(reporter: &mut Reporter<'_>) {
+    // Nobody else sends reports.
+    let _ = REPORTS.try_send(reporter.report());
 }

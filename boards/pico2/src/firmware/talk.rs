@@ -27,6 +27,7 @@ pub(crate) const BAUD: u32 = 115_200;
 /// Reports that are kept to be sent again.
 /// (Not a constant: a `None` is not all zeros, and would lie in flash four times.)
 static KEPT: StaticCell<[Option<Report>; 4]> = StaticCell::new();
+static LINK: StaticCell<Link<'static>> = StaticCell::new();
 
 const BOARD: Board = Board {
     version: [0, 1, 0],
@@ -38,20 +39,12 @@ const BOARD: Board = Board {
 #[embassy_executor::task]
 pub(crate) async fn talk(uart: BufferedUart, boot: Boot, started: Started) {
     let (mut out, mut input) = uart.split();
-    // The defaults are constants within the limits, as a test of the library shows.
-    let Ok(console) = Console::new(BOARD, started) else {
-        return;
-    };
-    let mut link = Link::new(
-        console,
-        Outbox::new(KEPT.init_with(|| [const { None }; 4])),
-        BAUD,
-    );
+    let Some(link) = set_up(started) else { return };
     let mut store = Remote;
     SETTINGS.lock(|s| s.replace(Some(*link.console().settings())));
     note(
         &mut out,
-        &link,
+        link,
         format_args!("rowtone {}: {boot}", env!("CARGO_PKG_VERSION")),
     )
     .await;
@@ -62,7 +55,7 @@ pub(crate) async fn talk(uart: BufferedUart, boot: Boot, started: Started) {
     loop {
         CORE1_ALIVE.fetch_add(1, Ordering::Relaxed);
         // No more than fits the UART's buffer, so that this never waits while samples do.
-        let bytes = link.poll(now_us(), &mut store);
+        let bytes = poll(link, &mut store);
         let take = bytes.len().min(64);
         let taken = match bytes.get(..take) {
             Some(chunk) if !chunk.is_empty() => out.write(chunk).await.unwrap_or(take),
@@ -72,30 +65,58 @@ pub(crate) async fn talk(uart: BufferedUart, boot: Boot, started: Started) {
         let wait = if taken > 0 { 0 } else { 20 };
         match select4(
             input.read(&mut byte),
-            REPORTS.receive(),
+            REPORTS.ready_to_receive(),
             CAMERA_STATE.wait(),
             Timer::after_millis(wait),
         )
         .await
         {
             Either4::First(Ok(1)) => {
-                link.receive(byte[0], now_us(), &mut store);
-                publish(&link);
+                receive(link, byte[0], &mut store);
+                publish(link);
             }
             // Noise on the line: what was garbled fails its check or is no command.
             Either4::First(_) => {}
-            Either4::Second(report) => {
-                link.push(first.marked(report));
+            Either4::Second(()) => {
+                take_report(link, &mut first);
                 let losses = losses();
                 if losses != said {
                     said = losses;
-                    note(&mut out, &link, format_args!("{losses}")).await;
+                    note(&mut out, link, format_args!("{losses}")).await;
                 }
             }
-            Either4::Third(state) => note(&mut out, &link, format_args!("{state}")).await,
+            Either4::Third(state) => note(&mut out, link, format_args!("{state}")).await,
             Either4::Fourth(()) => {}
         }
     }
+}
+
+/// The line's end. Not inlined: it is made on the stack, which shall not be the task's for ever.
+#[inline(never)]
+fn set_up(started: Started) -> Option<&'static mut Link<'static>> {
+    // The defaults are constants within the limits, as a test of the library shows.
+    let console = Console::new(BOARD, started).ok()?;
+    let outbox = Outbox::new(KEPT.init_with(|| [const { None }; 4]));
+    Some(LINK.init_with(|| Link::new(console, outbox, BAUD)))
+}
+
+// Each has a frame of its own, and none of them is on the stack while another is: reports are 1.8 KB, and inlined
+// the task would keep room for all of their copies at once.
+#[inline(never)]
+fn take_report(link: &mut Link<'_>, first: &mut FirstReport) {
+    if let Ok(report) = REPORTS.try_receive() {
+        link.push(first.marked(report));
+    }
+}
+
+#[inline(never)]
+fn poll<'l>(link: &'l mut Link<'_>, store: &mut Remote) -> &'l [u8] {
+    link.poll(now_us(), store)
+}
+
+#[inline(never)]
+fn receive(link: &mut Link<'_>, byte: u8, store: &mut Remote) {
+    link.receive(byte, now_us(), store);
 }
 
 fn now_us() -> u64 {
