@@ -178,9 +178,12 @@ impl Sheet<'_> {
                     let mix = |v: u8| (COLOUR * f64::from(v) + (1.0 - COLOUR) * grey) as u8;
                     RGBColor(mix(r), mix(g), mix(b))
                 });
+                // A little larger than it is, so that no seam shows; what comes next covers the rest.
+                let seam = |to: usize, all: usize| if to < all { 1 } else { 0 };
+                let (right, bottom) = self.at(x_to as f64, y_to as f64);
                 let corners = [
                     self.at(x as f64, y as f64),
-                    self.at(x_to as f64, y_to as f64),
+                    (right + seam(x_to, width), bottom + seam(y_to, height)),
                 ];
                 root.draw(&Rectangle::new(corners, colour.filled()))?;
             }
@@ -248,7 +251,8 @@ impl Sheet<'_> {
         let level = |step: i32| bottom - (bottom - top) * step / STEPS;
         for step in 0..STEPS {
             let colour = shade(f64::from(step) / f64::from(STEPS - 1));
-            let corners = [(bar, level(step + 1)), (bar + 14, level(step))];
+            let top = (level(step + 1) - 1).max(top);
+            let corners = [(bar, top), (bar + 14, level(step))];
             root.draw(&Rectangle::new(corners, colour.filled()))?;
         }
         for share in [0, 1, 2] {
