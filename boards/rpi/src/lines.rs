@@ -182,7 +182,7 @@ impl<'a> Lines<'a> {
         };
         let start_ns = frame.start_ns.unwrap_or_default();
         live.frames
-            .keep(frame.sequence, start_ns, layout, frame.bytes);
+            .offer(frame.sequence, start_ns, layout, frame.bytes);
     }
 
     /// The end: what is left becomes the last window, if it is long enough.

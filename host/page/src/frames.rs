@@ -2,8 +2,8 @@
 //!
 //! The camera's side calls [`Frames::offer`] once a frame. While nobody looks that costs one look at a clock; while
 //! somebody does, the frame's bytes are copied as they lie, into the next of a ring of slots. A slot that is being read is
-//! passed over: the frame is missing in the ring, and in nothing else. Unpacking, shrinking and encoding are the reader's
-//! work, on the reader's thread.
+//! passed over: the frame is missing in the ring, and in nothing else. Memory for the slots, unpacking, shrinking and
+//! encoding are the reader's work, on the reader's thread: whoever allocates may wait for somebody else who does.
 
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
@@ -116,6 +116,8 @@ pub struct Frames {
     kept: AtomicU64,
     /// Frames passed over because their slot was being read.
     missed: AtomicU64,
+    /// Bytes of a frame for which the slots had no memory; 0 where they have.
+    needed: AtomicUsize,
     /// Until when frames are wanted, ms after `began`.
     wanted_ms: AtomicU64,
     began: Instant,
@@ -130,6 +132,7 @@ impl Frames {
             used: AtomicUsize::new(2),
             kept: AtomicU64::new(0),
             missed: AtomicU64::new(0),
+            needed: AtomicUsize::new(0),
             wanted_ms: AtomicU64::new(0),
             began: Instant::now(),
         }
@@ -139,10 +142,37 @@ impl Frames {
         self.began.elapsed().as_millis() as u64
     }
 
-    /// Somebody looks: frames are kept for some seconds from now on.
+    /// Somebody looks: frames are kept for some seconds from now on. Gets memory for them where that is missing.
     pub fn want(&self) {
         let until = self.now_ms() + WATCHED.as_millis() as u64;
         self.wanted_ms.store(until, Ordering::Relaxed);
+        let needed = self.needed.swap(0, Ordering::AcqRel);
+        if needed > 0 {
+            self.get_memory(needed);
+        }
+    }
+
+    /// Memory of so many bytes for each slot in use, written once, so that its pages are there.
+    fn get_memory(&self, bytes: usize) {
+        let lacks = |shot: &Shot| shot.bytes.capacity() < bytes;
+        for slot in self.slots.iter().take(self.slots_of(bytes)) {
+            let lock = || slot.lock().unwrap_or_else(PoisonError::into_inner);
+            if !lacks(&lock()) {
+                continue;
+            }
+            let mut fresh = vec![1; bytes];
+            fresh.clear();
+            let mut shot = lock();
+            if lacks(&shot) {
+                std::mem::swap(&mut shot.bytes, &mut fresh);
+                shot.number = 0;
+            }
+        }
+    }
+
+    /// How many slots of frames of so many bytes have room.
+    fn slots_of(&self, bytes: usize) -> usize {
+        (self.room / bytes.max(1)).clamp(2, SLOTS)
     }
 
     /// Whether frames are kept.
@@ -150,20 +180,26 @@ impl Frames {
         self.now_ms() < self.wanted_ms.load(Ordering::Relaxed)
     }
 
-    /// Shows a frame. It never waits: the frame is copied where somebody looks and its slot is free.
+    /// Shows a frame. It never waits and never allocates: the frame is copied where somebody looks, its slot is free, and
+    /// there is memory for it, which the next [`Frames::want`] gets.
     pub fn offer(&self, frame: u32, start_ns: i64, layout: Layout, bytes: &[u8]) {
         if self.is_wanted() {
-            self.keep(frame, start_ns, layout, bytes);
+            self.put(frame, start_ns, layout, bytes, false);
         }
     }
 
-    /// The same whether anybody looks or not: of a recording, the last frame is still looked at when all are read.
+    /// The same whether anybody looks or not, and with memory of its own: of a recording, the last frame is still looked at
+    /// when all are read.
     pub fn keep(&self, frame: u32, start_ns: i64, layout: Layout, bytes: &[u8]) {
+        self.put(frame, start_ns, layout, bytes, true);
+    }
+
+    fn put(&self, frame: u32, start_ns: i64, layout: Layout, bytes: &[u8], may_allocate: bool) {
         let length = layout.bytes();
         let Some(bytes) = bytes.get(..length) else {
             return;
         };
-        let used = (self.room / length.max(1)).clamp(2, SLOTS);
+        let used = self.slots_of(length);
         self.used.store(used, Ordering::Relaxed);
         // One side offers, so nobody else counts.
         let number = self.kept.load(Ordering::Relaxed) + 1;
@@ -172,6 +208,11 @@ impl Frames {
             self.missed.fetch_add(1, Ordering::Relaxed);
             return;
         };
+        if !may_allocate && shot.bytes.capacity() < length {
+            self.needed.store(length, Ordering::Release);
+            self.missed.fetch_add(1, Ordering::Relaxed);
+            return;
+        }
         shot.bytes.clear();
         shot.bytes.extend_from_slice(bytes);
         (shot.number, shot.frame, shot.start_ns, shot.layout) = (number, frame, start_ns, layout);
@@ -237,6 +278,9 @@ mod tests {
         assert_eq!((frames.counts(), frames.newest()), ((0, 0), None));
         frames.want();
         frames.offer(2, 5, LAYOUT, &[2; 8]);
+        assert_eq!(frames.counts(), (0, 1), "there is no memory for it yet");
+        frames.want();
+        frames.offer(2, 5, LAYOUT, &[2; 8]);
         let newest = frames.newest().expect("it was wanted");
         assert_eq!(
             (newest.frame, newest.start_ns, newest.bytes.len()),
@@ -251,6 +295,7 @@ mod tests {
     fn a_slot_that_is_read_is_passed_over_and_counted() {
         let frames = Frames::new(0); // two slots
         frames.want();
+        frames.get_memory(8);
         for frame in 1..=2 {
             frames.offer(frame, 0, LAYOUT, &[0; 8]);
         }
@@ -266,6 +311,7 @@ mod tests {
     fn the_last_frames_follow_each_other() {
         let frames = Frames::new(8 * 10);
         frames.want();
+        frames.get_memory(8);
         for frame in 1..=25 {
             frames.offer(frame, 0, LAYOUT, &[0; 8]);
         }
@@ -278,6 +324,7 @@ mod tests {
     fn rows_are_unpacked_by_whoever_reads() {
         let frames = Frames::new(1000);
         frames.want();
+        frames.get_memory(8);
         let layout = Layout {
             width: 2,
             height: 2,

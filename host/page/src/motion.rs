@@ -24,9 +24,18 @@ struct Moment {
 }
 
 /// The samples, on the side where they are read.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Motion {
     moments: Mutex<VecDeque<Moment>>,
+}
+
+impl Default for Motion {
+    /// With all its memory, so that whoever hands over never allocates.
+    fn default() -> Self {
+        Self {
+            moments: Mutex::new(VecDeque::with_capacity(KEPT)),
+        }
+    }
 }
 
 /// The samples, on the side where they are made: it never waits.
