@@ -272,6 +272,12 @@ impl<'a> Judge<'a> {
 
     /// Key frames of the window see a tone of all frames much smaller, or not at all.
     fn refutes(&self, frames: &std::ops::Range<usize>, peak: &Peak) -> bool {
+        // At a multiple of their rate a tone stands still in key frames, as if it were each row's own place.
+        let (hz, rate_hz) = (f64::from(peak.hz), self.data.rate_hz());
+        let away_hz = (hz - (hz / rate_hz).round() * rate_hz).abs();
+        if away_hz < 1.0 / self.data.span_s().max(1e-9) {
+            return false;
+        }
         let mut tones = self.found.tones.clone();
         let mut orbit = Orbit::default();
         orbit.px[0] = peak.amplitude_px.into();
