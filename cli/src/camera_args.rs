@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use crate::known_length::KnownLength;
 use rowtone::tracker::Axes;
 use rowtone_clip::{CameraOptions, FRAME_RATES_HZ, Rect, Roi, Turn};
 
@@ -57,8 +58,16 @@ pub(crate) struct CameraArgs {
     #[arg(long)]
     pub global_shutter: bool,
     /// Scale: adds µm and mm/s to the output
-    #[arg(long, value_name = "S", value_parser = positive, allow_negative_numbers = true)]
-    pub um_per_px: Option<f64>,
+    #[arg(long, value_name = "S", group = "scale", value_parser = positive, allow_negative_numbers = true)]
+    um_per_px: Option<f64>,
+    /// Scale by something of known length: two places in the given picture, px, and how far apart they are
+    #[arg(
+        long,
+        value_name = "X1,Y1,X2,Y2=35mm",
+        group = "scale",
+        allow_hyphen_values = true
+    )]
+    known: Option<KnownLength>,
 }
 
 fn axes(text: &str) -> Result<Axes, String> {
@@ -94,6 +103,11 @@ fn number(text: &str, good: impl Fn(f64) -> bool) -> Option<f64> {
 }
 
 impl CameraArgs {
+    /// Scale of the picture, µm a pixel, where one was given.
+    pub(crate) fn um_per_px(&self) -> Option<f64> {
+        self.um_per_px.or(self.known.map(|known| known.um_per_px()))
+    }
+
     /// What they say.
     pub(crate) fn options(&self) -> CameraOptions {
         CameraOptions {
@@ -108,7 +122,7 @@ impl CameraArgs {
             rotate: self.rotate,
             axes: self.axes,
             global_shutter: self.global_shutter,
-            um_per_px: self.um_per_px,
+            um_per_px: self.um_per_px(),
         }
     }
 }

@@ -9,6 +9,7 @@
 mod camera_args;
 pub mod commands;
 pub mod failure;
+mod known_length;
 pub mod output;
 pub mod stop;
 mod terminal;

@@ -150,6 +150,27 @@ fn the_cameras_own_motion_is_subtracted() {
 }
 
 #[test]
+fn something_of_known_length_gives_the_scale() {
+    let clip = file("known.y4m", &y4m(config(60)));
+    // Fifty pixels.
+    let known = ["--known", "0,0,30,40=5mm", "--format", "json"];
+    let peak = &reports(&texts(&on_clip("analyze", &clip, &known)).0)[0]["peaks"][0];
+    let of = |key: &str| peak[key].as_f64().unwrap();
+    assert!(
+        (of("amplitude_um") / of("amplitude_px") - 100.0).abs() < 0.1,
+        "{peak}"
+    );
+    let twice = ["--known", "0,0,30,40=5mm", "--um-per-px", "100"];
+    assert_failure(
+        &on_clip("analyze", &clip, &twice),
+        2,
+        &["--known", "--um-per-px"],
+    );
+    let unknown = ["--known", "0,0,30,40=5"];
+    assert_failure(&on_clip("analyze", &clip, &unknown), 2, &["35mm"]);
+}
+
+#[test]
 fn wire_sentences_are_what_monitor_reads() {
     let clip = file("wire.y4m", &y4m(config(60)));
     let output = on_clip("analyze", &clip, &["--format", "wire"]);

@@ -78,3 +78,22 @@ fn a_folder_without_descriptions_is_refused() {
     let output = command(["verify", "no/such/folder"]).output().unwrap();
     common::assert_failure(&output, 1, &["no/such/folder"]);
 }
+
+#[test]
+fn a_recipe_writes_the_sound_that_is_to_be_filmed() {
+    let folder = folder("recipe");
+    let output = command(["verify", "--recipe", folder.to_str().unwrap()])
+        .output()
+        .unwrap();
+    let (stdout, stderr) = texts(&output);
+    assert!(output.status.success(), "{stderr}");
+    assert!(stdout.contains("83.3, 131.7, 211.9 Hz"), "{stdout}");
+    let sound = std::fs::read(folder.join("tones.wav")).unwrap();
+    assert!(sound.starts_with(b"RIFF") && sound.len() > 1_000_000);
+    let output = command(["verify", "--recipe", "no/such/folder"])
+        .output()
+        .unwrap();
+    common::assert_failure(&output, 1, &["tones.wav"]);
+    let output = command(["verify"]).output().unwrap();
+    common::assert_failure(&output, 2, &["FOLDER"]);
+}

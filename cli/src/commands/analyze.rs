@@ -37,7 +37,7 @@ pub struct Args {
     #[command(flatten)]
     window: WindowArgs,
     /// Where the zones B, C and D of ISO 20816 begin for this machine, mm/s RMS: adds its zone
-    #[arg(long, value_name = "B,C,D", requires = "um_per_px")]
+    #[arg(long, value_name = "B,C,D", requires = "scale")]
     zone_limits: Option<ZoneLimits>,
     /// Format of the reports on standard output
     #[arg(long, value_enum, default_value = "text")]
@@ -81,17 +81,17 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         Sender::open(
             port,
             session,
-            &args.window.as_a_board_says(args.camera.um_per_px),
+            &args.window.as_a_board_says(args.camera.um_per_px()),
             may_wait,
         )
     });
     let serial = serial.transpose()?;
     let mut feed = Feed::open(&options)?;
     feed.stop_when(crate::stop::on_signals());
-    let settings = args.window.as_a_board_says(args.camera.um_per_px);
+    let settings = args.window.as_a_board_says(args.camera.um_per_px());
     let report = args.report.clone();
     let page = report.map(|path| StillPage::new(path, &mut feed, settings));
-    let plan = Plan::new(&feed.camera, &args.window.settings(args.camera.um_per_px))?;
+    let plan = Plan::new(&feed.camera, &args.window.settings(args.camera.um_per_px()))?;
     let shifts = Shifts::start(feed, Some(plan.groups()))?;
     let picture = args.plot.clone().map(|path| {
         Picture::new(rowtone_plot::Settings {

@@ -278,7 +278,7 @@ fn sum(rows: &[Displacement], start_ns: i64) -> Option<Measured> {
 }
 
 fn write(args: &Args, format: Format, series: &Series, rate_hz: u32) -> Result<(), Failure> {
-    let um_per_px = args.camera.um_per_px;
+    let um_per_px = args.camera.um_per_px();
     let place = args.output.as_deref();
     let name = place.map_or("standard output".to_owned(), |p| p.display().to_string());
     let written = match format {

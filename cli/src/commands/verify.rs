@@ -1,5 +1,6 @@
 //! `rowtone verify`: the program scored on recordings whose truth is known.
 
+mod recipe;
 mod score;
 mod truth;
 
@@ -31,11 +32,15 @@ use crate::output::Out;
     A recording is right if every window has every tone, and nothing else above\n\
     that share that is not marked as ambiguous. Of a tone that dies away evenly,\n\
     amplitude_px is that of the first window. Exit status 1 if any is not right.\n\n\
-    Example:\n  rowtone verify recordings"
+    Examples:\n  rowtone verify recordings\n  rowtone verify --recipe recordings"
 )]
 pub struct Args {
-    /// The folder
-    folder: PathBuf,
+    /// The folder [with --recipe: here]
+    #[arg(required_unless_present = "recipe")]
+    folder: Option<PathBuf>,
+    /// Says how to make a recording with known tones, and writes the sound for it, tones.wav, into the folder
+    #[arg(long)]
+    recipe: bool,
 }
 
 /// Scores every recording of the folder.
@@ -43,8 +48,12 @@ pub struct Args {
 /// # Errors
 /// [`Failure::Input`] for a folder without descriptions, and where a recording is not right.
 pub fn run(args: &Args) -> Result<(), Failure> {
+    let folder = args.folder.as_deref().unwrap_or(Path::new("."));
+    if args.recipe {
+        return recipe::give(folder);
+    }
     let stop = crate::stop::on_signals();
-    let descriptions = descriptions(&args.folder)?;
+    let descriptions = descriptions(folder)?;
     let mut out = Out::default();
     out.line(&score::heading())?;
     let mut wrong = 0;
@@ -60,7 +69,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             .to_string_lossy()
             .into_owned();
         let score = Truth::read(path).and_then(|truth| {
-            let reports = measure(&args.folder, &truth)?;
+            let reports = measure(folder, &truth)?;
             Ok(Score::of(&reports, &truth))
         });
         match score {
@@ -79,7 +88,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         0 => Ok(()),
         _ => Err(Failure::input(format!(
             "{}: {wrong} of {} recordings are not right",
-            args.folder.display(),
+            folder.display(),
             descriptions.len()
         ))),
     }

@@ -155,7 +155,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
 
 fn desk(args: &Args, camera: Option<&Camera>, interrupt: &Arc<AtomicBool>) -> Desk {
     let (width, height) = camera.map_or((0, 0), given_size);
-    let mut settings = args.window.as_a_board_says(args.camera.um_per_px);
+    let mut settings = args.window.as_a_board_says(args.camera.um_per_px());
     if let Roi::Part(Rect {
         x,
         y,
