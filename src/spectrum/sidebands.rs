@@ -271,7 +271,7 @@ mod tests {
         let list = told(&[
             line(83.3, 0.2, 0.7),
             line(88.3, 0.05, 1.0),
-            line(78.3, 0.05, 0.4 + 3.14),
+            line(78.3, 0.05, 0.4 + core::f32::consts::PI),
         ]);
         assert!(list[0].peak.motion.unwrap().modulation.unwrap().of_phase);
     }

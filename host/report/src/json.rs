@@ -17,8 +17,9 @@ struct ReportObject {
     noise_px: f32,
     #[serde(flatten)]
     place: Option<Place>,
+    /// `null` where a recording was measured without a scale; a wire's report without one has no such key.
     #[serde(skip_serializing_if = "Option::is_none")]
-    velocity_mm_s_rms: Option<f32>,
+    velocity_mm_s_rms: Option<Option<f32>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     zone: Option<char>,
     peaks: Vec<PeakObject>,
@@ -207,7 +208,8 @@ fn to_string(
         lost_frames: report.lost_frames,
         noise_px: report.noise_px,
         place,
-        velocity_mm_s_rms: velocity.map(|v| v as f32),
+        velocity_mm_s_rms: (place.is_some() || velocity.is_some())
+            .then(|| velocity.map(|v| v as f32)),
         zone: limits.zip(velocity).map(|(limits, v)| limits.zone(v)),
         peaks: report
             .peaks
@@ -284,7 +286,9 @@ mod tests {
             axes: "x",
         };
         let text = super::measured(&report, &[shape], place, None);
-        assert!(text.contains(r#""noise_px":0.0131,"roi":[4,0,120,300],"axes":"x","peaks""#));
+        assert!(text.contains(
+            r#""noise_px":0.0131,"roi":[4,0,120,300],"axes":"x","velocity_mm_s_rms":null,"peaks""#
+        ));
         assert!(
             text.contains(concat!(
                 r#""x_px":0.3998,"x_px_sd":0.0002,"y_px":null,"y_px_sd":null,"phase_rad":0.31,"#,
