@@ -5,8 +5,8 @@ use std::f64::consts::TAU;
 use rowtone::camera::Timing;
 use rowtone::pipeline::ReportSide;
 use rowtone::report::{Report, Warning};
-use rowtone::spectrum::{Config, StaticStorage};
-use rowtone::timeline::{Group, Sample, rows_per_sample};
+use rowtone::spectrum::{Config, StaticCouplings, StaticStorage};
+use rowtone::timeline::{Group, Sample, Vertical, rows_per_sample};
 use rowtone_chance::{Chance, Mmix};
 
 type Memory = StaticStorage<8192, 128, 128, 16384, 17>;
@@ -23,12 +23,15 @@ struct Said {
     line: f64,
     rate: f64,
     upside_down: bool,
+    /// The rows know y too, along which nothing moves.
+    knows_y: bool,
 }
 
 const RIGHT: Said = Said {
     line: 1.0,
     rate: 1.0,
     upside_down: false,
+    knows_y: false,
 };
 
 /// One second of `motion` (px at s and η, −1 in the row exposed first and 1 in the last) as `said`.
@@ -47,7 +50,12 @@ fn report(seed: u64, said: Said, motion: impl Fn(f64, f64) -> f64) -> Report {
         window_ns: (1e9 / said.rate) as i64 + 1,
         ..Config::default()
     };
-    let mut analyzer = ReportSide::new(config, group, memory.lend()).unwrap();
+    let mut couplings = StaticCouplings::<128>::new();
+    let lent = match said.knows_y {
+        true => memory.lend().with_couplings(&mut couplings),
+        false => memory.lend(),
+    };
+    let mut analyzer = ReportSide::new(config, group, lent).unwrap();
     for frame in 0..60_u32 {
         for slot in 0..group.slots() {
             let first = f64::from(slot) * f64::from(group.rows_per_sample());
@@ -65,7 +73,11 @@ fn report(seed: u64, said: Said, motion: impl Fn(f64, f64) -> f64) -> Report {
                 time_ns: start_ns + group.middle_ns(slot),
                 shift_px: (moved + NOISE_PX * noise.bell()) as f32,
                 information_per_px2: (1.0 / (NOISE_PX * NOISE_PX)) as f32,
-                vertical: None,
+                vertical: said.knows_y.then(|| Vertical {
+                    shift_px: (NOISE_PX * noise.bell()) as f32,
+                    information_per_px2: (1.0 / (NOISE_PX * NOISE_PX)) as f32,
+                    ..Vertical::default()
+                }),
                 spread: group.even_spread(),
             });
         }
@@ -144,6 +156,21 @@ fn a_wrong_time_base_is_flagged() {
                 "{line}: {report:?}"
             );
         }
+    }
+    // What moves along x alone is not left out because most of what both axes say is noise.
+    for seed in 0..4 {
+        let said = Said {
+            line: 0.95,
+            knows_y: true,
+            ..RIGHT
+        };
+        let report = report(seed, said, machine);
+        assert!(flagged(&report), "{report:?}");
+        let us = report.line_time_us_fit.map(f64::from);
+        assert!(
+            us.is_some_and(|us| (us / LINE_US - 1.0).abs() < 0.003),
+            "{report:?}"
+        );
     }
     for said in [
         Said {

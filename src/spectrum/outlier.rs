@@ -2,7 +2,10 @@
 //!
 //! One sample of 5 px among thousands that are known to 0.02 px lifts the noise at all frequencies. What is
 //! beyond five standard deviations (told by the median, which outliers do not move) is left out where the
-//! same rows of the frames before and after are not: a blow stays for more than a frame.
+//! same rows of the frames before and after are not: a blow stays for more than a frame. Each axis is judged by its own
+//! median: a swing along x is no outlier because nothing moves along y.
+
+use core::ops::Range;
 
 use super::fit::Model;
 use super::model::Samples;
@@ -23,31 +26,43 @@ const ROUNDS: u32 = 2;
 /// Leaves the samples out that are far off what `model` says, with `sizes` as working memory; gives how many.
 pub(crate) fn leave_out(samples: &mut Samples<'_>, model: &Model, sizes: &mut [f32]) -> u32 {
     let mut left_out = 0;
-    for _ in 0..ROUNDS {
-        model.tabulate(samples);
-        let Some(limit) = limit(samples, model, sizes) else {
-            break;
-        };
-        let found = sweep(samples, model, limit, false);
-        if found == 0 || found as f32 > MOST * samples.count as f32 {
-            break;
+    for channel in 0..samples.channels {
+        let series = channel * samples.slots..(channel + 1) * samples.slots;
+        for _ in 0..ROUNDS {
+            model.tabulate(samples);
+            let Some((limit, count)) = limit(samples, model, sizes, series.clone()) else {
+                break;
+            };
+            let found = sweep(samples, model, limit, (series.clone(), false));
+            if found == 0 || found as f32 > MOST * count as f32 {
+                break;
+            }
+            sweep(samples, model, limit, (series.clone(), true));
+            left_out += found;
         }
-        sweep(samples, model, limit, true);
-        left_out += found;
     }
     left_out
 }
 
-/// The size that a sample's residual over its deviation has at most, if it is no outlier.
-fn limit(samples: &mut Samples<'_>, model: &Model, sizes: &mut [f32]) -> Option<f32> {
-    let (n, mut used) = (samples.frames, 0);
+/// The size that a sample's residual over its deviation has at most, if it is no outlier, and how many samples these
+/// series have.
+fn limit(
+    samples: &mut Samples<'_>,
+    model: &Model,
+    sizes: &mut [f32],
+    of: Range<usize>,
+) -> Option<(f32, u32)> {
+    let (n, mut used, mut count) = (samples.frames, 0, 0);
     // A few thousand tell the median as well.
     let every = (samples.count as usize / sizes.len().max(1)) + 1;
-    for series in 0..samples.series() {
+    for series in of {
         if samples.series_weight[series] <= 0.0 {
             continue;
         }
         samples.residual(series, &model.tones, &model.drift);
+        let weights = samples.weight.get(series * n..(series + 1) * n);
+        let known = |w: &&u16| **w > 0;
+        count += weights.unwrap_or_default().iter().filter(known).count() as u32;
         for i in (series % every..n).step_by(every) {
             let w = unpack_weight(samples.weight[series * n + i]);
             if w > 0.0 && used < sizes.len() {
@@ -69,13 +84,18 @@ fn limit(samples: &mut Samples<'_>, model: &Model, sizes: &mut [f32]) -> Option<
         }
     }
     let limit = FAR * high / MEDIAN;
-    (limit.is_finite() && limit > 0.0 && largest > limit).then_some(limit)
+    (limit.is_finite() && limit > 0.0 && largest > limit).then_some((limit, count))
 }
 
 /// Counts the outliers and, if `leave`, leaves them out.
-fn sweep(samples: &mut Samples<'_>, model: &Model, limit: f32, leave: bool) -> u32 {
+fn sweep(
+    samples: &mut Samples<'_>,
+    model: &Model,
+    limit: f32,
+    (of, leave): (Range<usize>, bool),
+) -> u32 {
     let (n, mut found) = (samples.frames, 0);
-    for series in 0..samples.series() {
+    for series in of {
         if samples.series_weight[series] <= 0.0 {
             continue;
         }
