@@ -310,7 +310,7 @@ impl VerticalBuild {
             Step::Balance => {
                 self.balance(span, mean, w, h);
                 if ended {
-                    self.light.solve();
+                    self.light.solve(width);
                 }
                 VerticalStep::Prepare(Step::Orthogonalise)
             }
