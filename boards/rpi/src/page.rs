@@ -10,7 +10,7 @@ use std::time::Duration;
 use rowtone::link::settings::{Key, Limits, Settings};
 use rowtone::report::{PeakShape, Report};
 use rowtone::tracker::Axes;
-use rowtone_page::control::{Access, Control, Keeper};
+use rowtone_page::control::{Access, BOARD_KEYS, Control, Keeper};
 use rowtone_page::guard::Names;
 use rowtone_page::live::{About, Live, Phase};
 use rowtone_page::server::Server;
@@ -24,17 +24,6 @@ use crate::setup::Setup;
 
 /// How long the output thread may take to use other settings: it looks every 5 ms.
 const PATIENCE: Duration = Duration::from_secs(2);
-/// What can be changed on the page; how reports are written is the line's.
-const KEYS: [Key; 8] = [
-    Key::Roi,
-    Key::UmPerPx,
-    Key::Window,
-    Key::Hop,
-    Key::MaxPeaks,
-    Key::FalseAlarm,
-    Key::MinHz,
-    Key::MaxHz,
-];
 
 /// Says what is measured from now on; what was shown before belongs to other settings.
 pub(crate) fn describe(live: &Live, facts: &Facts, setup: &Setup, config: &Config) {
@@ -99,7 +88,7 @@ impl Control for Desk {
     }
 
     fn keys(&self) -> &[Key] {
-        &KEYS
+        &BOARD_KEYS
     }
 
     fn is_live(&self) -> bool {

@@ -25,6 +25,18 @@ pub trait Control: Send + Sync {
     fn change(&self, settings: Settings) -> Result<(), String>;
 }
 
+/// What can be changed of a board on the page; how reports are written is the line's.
+pub const BOARD_KEYS: [Key; 8] = [
+    Key::Roi,
+    Key::UmPerPx,
+    Key::Window,
+    Key::Hop,
+    Key::MaxPeaks,
+    Key::FalseAlarm,
+    Key::MinHz,
+    Key::MaxHz,
+];
+
 /// Why a change was refused: the setting's name where one is at fault, and the reason.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Refused {

@@ -69,16 +69,16 @@ impl Shot {
         bytes: Vec::new(),
     };
 
+    /// How the pixels of a row lie, how many there are, and the bytes from it on.
+    fn row(&self, row: usize) -> (RawFormat, usize, &[u8]) {
+        let bytes = self.bytes.get(row * self.layout.stride..);
+        let width = usize::from(self.layout.width);
+        (self.layout.format, width, bytes.unwrap_or_default())
+    }
+
     /// One row's upper 8 bits, appended to `to`.
     pub fn grey_row(&self, row: usize, to: &mut Vec<u8>) {
-        let Layout {
-            width,
-            stride,
-            format,
-            ..
-        } = self.layout;
-        let width = usize::from(width);
-        let bytes = self.bytes.get(row * stride..).unwrap_or_default();
+        let (format, width, bytes) = self.row(row);
         let mut room = vec![0; width];
         match format.upper_line(bytes, width, &mut room) {
             Ok(pixels) => to.extend(pixels.values().map(|value| value as u8)),
@@ -88,14 +88,7 @@ impl Shot {
 
     /// One row with all its bits, little-endian words where it has more than 8, appended to `to`.
     pub fn full_row(&self, row: usize, to: &mut Vec<u8>) {
-        let Layout {
-            width,
-            stride,
-            format,
-            ..
-        } = self.layout;
-        let width = usize::from(width);
-        let bytes = self.bytes.get(row * stride..).unwrap_or_default();
+        let (format, width, bytes) = self.row(row);
         let mut room = vec![0; width];
         match format.line(bytes, width, &mut room) {
             Ok(Pixels::U16(pixels)) => to.extend(pixels.iter().flat_map(|v| v.to_le_bytes())),

@@ -9,24 +9,13 @@ use super::{Args, open};
 use crate::failure::Failure;
 use rowtone::link::settings::{Key, Limits, Settings};
 use rowtone::wire::text;
-use rowtone_page::control::Control;
+use rowtone_page::control::{BOARD_KEYS, Control};
 use rowtone_page::live::{About, Live, Phase};
 use rowtone_report::json;
 use rowtone_serial::line::{self, Event};
 use rowtone_serial::port::PortName;
 use rowtone_serial::receiver::{Heard, Receiver};
 
-/// What can be changed of a board.
-const KEYS: [Key; 8] = [
-    Key::Roi,
-    Key::UmPerPx,
-    Key::Window,
-    Key::Hop,
-    Key::MaxPeaks,
-    Key::FalseAlarm,
-    Key::MinHz,
-    Key::MaxHz,
-];
 /// How long a board may take for an answer.
 const PATIENCE: Duration = Duration::from_secs(3);
 /// Its settings are asked for so often until they are known.
@@ -107,7 +96,7 @@ impl Control for Board {
 
     fn keys(&self) -> &[Key] {
         if self.known.load(Ordering::Acquire) {
-            &KEYS
+            &BOARD_KEYS
         } else {
             &[]
         }
@@ -120,7 +109,7 @@ impl Control for Board {
     fn change(&self, settings: Settings) -> Result<(), String> {
         let before = self.settings();
         let mut command = "set".to_owned();
-        for key in KEYS {
+        for key in BOARD_KEYS {
             let (mut old, mut new) = (String::new(), String::new());
             // Writing to a string cannot fail.
             let _ = key.write(&before, &mut old);
