@@ -260,7 +260,7 @@ fn view<'s>(
         slot_ns: storage.slot_ns,
         slot_t,
         slot_eta,
-        ends: l.ends,
+        rows: l.rows,
         couplings: storage.samples.couplings,
         series_weight,
         score_re,

@@ -27,8 +27,8 @@ pub(crate) struct Loaded {
     pub(crate) zero_ns: i64,
     /// All frames came at that one rate.
     pub(crate) steady_rate: bool,
-    /// Where the part's first and last row are among those that know something, η.
-    pub(crate) ends: [f32; 2],
+    /// Where the rows are among those that know something.
+    pub(crate) rows: KnowingRows,
 }
 
 impl Loaded {
@@ -152,7 +152,7 @@ impl Loaded {
             total += sum;
         }
         let knows = |slot: usize| slot_weight[slot] + second_weight.get(slot).unwrap_or(&0.0);
-        self.ends = spread_over_rows(slot_eta, knows, total, group);
+        self.rows = spread_over_rows(slot_eta, knows, total, group);
         let middle = if total > 0.0 {
             (late / total) as i64
         } else {
@@ -213,14 +213,43 @@ const KNOWS: f32 = 0.02;
 /// compare with, not a sky.
 const BORDER: f32 = 0.08;
 
-/// Where the slots' middles are from the first row that knows something, −1, to the last, 1. Gives where the
-/// middles of the part's first and last row are, or the farthest place beyond those that a shape is told for.
+/// The rows that know something, from the upper edge of the first, η = −1, to the lower edge of the last, 1.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct KnowingRows {
+    /// Rows of the part above them, and half of how many they are.
+    begin: f32,
+    half: f32,
+    /// Rows of the part.
+    all: f32,
+}
+
+impl KnowingRows {
+    /// η of a place, counted in rows from the part's upper edge.
+    fn eta(&self, place: f32) -> f32 {
+        (place - self.begin) / self.half - 1.0
+    }
+
+    /// The row whose middle is nearest to a place among them.
+    pub(crate) fn row(&self, eta: f32) -> u16 {
+        // A row's middle is half a row below its upper edge.
+        let row = self.begin + (eta + 1.0) * self.half - 0.5;
+        libm::roundf(row.clamp(0.0, (self.all - 1.0).max(0.0))) as u16
+    }
+
+    /// Where the middles of the part's first and last row are, or the farthest places beyond the rows that know something
+    /// for which a shape is told.
+    pub(crate) fn ends(&self) -> [f32; 2] {
+        [0.5, self.all - 0.5].map(|place| self.eta(place).clamp(-1.0 - BORDER, 1.0 + BORDER))
+    }
+}
+
+/// Where the slots' middles are among the rows that know something.
 fn spread_over_rows(
     eta: &mut [f32],
     weight: impl Fn(usize) -> f32,
     total: f32,
     group: &Group,
-) -> [f32; 2] {
+) -> KnowingRows {
     let slots = eta.len();
     let mean = total / slots.max(1) as f32;
     let knows = |slot: &usize| weight(*slot) > KNOWS * mean;
@@ -229,11 +258,14 @@ fn spread_over_rows(
     let rows = f32::from(group.rows_per_sample());
     let begin = first as f32 * rows;
     let end = last as f32 * rows + f32::from(group.rows_of(last as u16));
-    let half = (0.5 * (end - begin)).max(0.5);
+    let knowing = KnowingRows {
+        begin,
+        half: (0.5 * (end - begin)).max(0.5),
+        all: f32::from(group.timing().rows()),
+    };
     for (slot, eta) in eta.iter_mut().enumerate() {
         let middle = slot as f32 * rows + 0.5 * f32::from(group.rows_of(slot as u16));
-        *eta = ((middle - begin) / half - 1.0).clamp(-1.0, 1.0);
+        *eta = knowing.eta(middle).clamp(-1.0, 1.0);
     }
-    let all = f32::from(group.timing().rows());
-    [0.5, all - 0.5].map(|row| ((row - begin) / half - 1.0).clamp(-1.0 - BORDER, 1.0 + BORDER))
+    knowing
 }

@@ -9,6 +9,7 @@ use num_complex::Complex32 as Complex;
 
 use super::blur::blur;
 use super::fit::Model;
+use super::load::KnowingRows;
 use super::notch::{NOTCHES, Notch};
 use super::phase::Frequency;
 use super::rows;
@@ -64,8 +65,8 @@ pub(crate) struct Samples<'a> {
     pub(crate) slot_t: &'a mut [f32],
     /// Where a slot is among the rows that know something, −1 to 1.
     pub(crate) slot_eta: &'a [f32],
-    /// Where the part's first and last row are in the same measure: shapes are told from one to the other.
-    pub(crate) ends: [f32; 2],
+    /// How places among them are rows of the part.
+    pub(crate) rows: KnowingRows,
     /// How the two series of a slot see both axes.
     pub(crate) couplings: &'a [SlotCoupling],
     /// Sum of weights of each series.

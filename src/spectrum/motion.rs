@@ -10,7 +10,6 @@ use super::shape::{Shape, legendre};
 use super::tone::Tone;
 use crate::math::sqrtf;
 use crate::report::{PeakShape, SHAPE_ROWS, ShapeRow};
-use crate::timeline::Group;
 
 /// Bands of rows in which it is looked at whether what a shape does not follow is smooth.
 const WIDE: usize = 6;
@@ -115,23 +114,15 @@ pub(crate) fn believe_bands(each: f32, smooth: bool) -> bool {
 /// The rows of a report's shape.
 pub(crate) fn over_rows(
     samples: &Samples<'_>,
-    group: &Group,
     tone: &Tone,
     bands: Option<&Bands>,
     scale: Scale,
 ) -> PeakShape {
-    let slots = samples.knowing();
-    let per_sample = f32::from(group.rows_per_sample());
-    let begin = slots.start as f32 * per_sample;
-    let last = slots.end.saturating_sub(1) as u16;
-    let end = f32::from(last) * per_sample + f32::from(group.rows_of(last));
-    let half = (0.5 * (end - begin)).max(0.5);
-    let most = f32::from(group.timing().rows().saturating_sub(1));
     let mut shape = PeakShape {
         hz: tone.frequency.hz(),
         ..PeakShape::default()
     };
-    let [from, to] = samples.ends;
+    let [from, to] = samples.rows.ends();
     for i in 0..SHAPE_ROWS {
         let eta = from + (to - from) * i as f32 / (SHAPE_ROWS - 1) as f32;
         let [x, y] = match bands.and_then(|b| nearest(b, eta)) {
@@ -140,10 +131,8 @@ pub(crate) fn over_rows(
         };
         let (x_px, x_phase_rad) = scale.polar(x, tone.frequency);
         let (y_px, y_phase_rad) = scale.polar(y, tone.frequency);
-        // A row's middle is half a row below its upper edge.
-        let row = begin + (eta + 1.0) * half - 0.5;
         let _ = shape.rows.push(ShapeRow {
-            row: libm::roundf(row.clamp(0.0, most)) as u16,
+            row: samples.rows.row(eta),
             x_px,
             x_phase_rad,
             y_px,

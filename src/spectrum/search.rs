@@ -660,7 +660,7 @@ impl Search {
         let mut weakest: Option<(usize, f32)> = None;
         let steady = |t: &Tone| !t.frozen && t.onset.is_none();
         for (i, tone) in model.tones.iter().enumerate().filter(|(_, t)| steady(t)) {
-            let (eta, orbit) = largest(&tone.shape, samples.ends);
+            let (eta, orbit) = largest(&tone.shape, samples.rows.ends());
             let along = direction(eta, orbit.towards);
             let unit = fit.deviation(&regressors, i, samples.length_s, &along);
             let over = orbit.semi_major_px / unit.amplitude_px;

@@ -80,7 +80,7 @@ impl Search {
                 model.squares - best.squares
             } else {
                 let regressors = fit.weigh(samples, best);
-                let (eta, orbit) = largest(&tone.shape, samples.ends);
+                let (eta, orbit) = largest(&tone.shape, samples.rows.ends());
                 let along = direction(eta, orbit.towards);
                 let unit = fit.deviation(&regressors, i, samples.length_s, &along);
                 let over = orbit.semi_major_px / unit.amplitude_px;

@@ -269,13 +269,7 @@ impl Telling<'_> {
                 axis,
             });
             if !told.rigid {
-                let _ = shapes.push(over_rows(
-                    samples,
-                    self.group,
-                    tone,
-                    told.bands.as_ref(),
-                    scale,
-                ));
+                let _ = shapes.push(over_rows(samples, tone, told.bands.as_ref(), scale));
             }
         }
     }
@@ -293,7 +287,7 @@ impl Telling<'_> {
         let Some(tone) = model.tones.get(i) else {
             return told;
         };
-        let (eta, orbit) = largest(&tone.shape, samples.ends);
+        let (eta, orbit) = largest(&tone.shape, samples.rows.ends());
         let length_s = samples.length_s;
         let along = |towards: [Complex; 2]| {
             let along = direction(eta, towards);
