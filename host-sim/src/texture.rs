@@ -10,10 +10,8 @@
 //! of a component at half a cycle per pixel and 10⁻³ at one.
 
 use std::ops::Range;
-use std::sync::Arc;
 
-use rustfft::num_complex::Complex64;
-use rustfft::{Fft, FftDirection, FftPlannerScalar};
+use rowtone_fourier::{Complex64, Fourier};
 
 /// Values kept for each pixel.
 pub const FINENESS: usize = 8;
@@ -51,14 +49,11 @@ impl Texture {
         );
         let rows = strip.values.len() / coarse;
         let fine = strip.period_px * FINENESS;
-        let mut planner = FftPlannerScalar::new();
-        let forward = planner.plan_fft(coarse, FftDirection::Forward);
-        let backward = planner.plan_fft(fine, FftDirection::Inverse);
         let transfer = transfer_function(strip, blur_px);
         let mut table = vec![0.0; rows * fine];
-        let mut buffers = Buffers::new(&*forward, &*backward);
+        let mut buffers = Buffers::new(coarse, fine);
         for (values, out) in strip.values.chunks(coarse).zip(table.chunks_mut(fine)) {
-            buffers.blur(values, &transfer, &forward, &backward);
+            buffers.blur(values, &transfer);
             for (k, v) in buffers.fine.iter().enumerate() {
                 let level = dark + (bright - dark) * v.re / coarse as f64;
                 // Rounded so that the last bits of a Fourier transform do not matter.
@@ -163,34 +158,27 @@ fn transfer_function(strip: &Strip, blur_px: f64) -> Vec<f64> {
 struct Buffers {
     coarse: Vec<Complex64>,
     fine: Vec<Complex64>,
-    scratch: Vec<Complex64>,
+    forward: Fourier,
+    backward: Fourier,
 }
 
 impl Buffers {
-    fn new(forward: &dyn Fft<f64>, backward: &dyn Fft<f64>) -> Self {
-        let need = forward
-            .get_inplace_scratch_len()
-            .max(backward.get_inplace_scratch_len());
+    fn new(coarse: usize, fine: usize) -> Self {
         let zero = Complex64::default();
         Self {
-            coarse: vec![zero; forward.len()],
-            fine: vec![zero; backward.len()],
-            scratch: vec![zero; need],
+            coarse: vec![zero; coarse],
+            fine: vec![zero; fine],
+            forward: Fourier::forward(coarse),
+            backward: Fourier::inverse(fine),
         }
     }
 
     /// Leaves the blurred row in `fine`, times the length of `values`.
-    fn blur(
-        &mut self,
-        values: &[f32],
-        transfer: &[f64],
-        forward: &Arc<dyn Fft<f64>>,
-        backward: &Arc<dyn Fft<f64>>,
-    ) {
+    fn blur(&mut self, values: &[f32], transfer: &[f64]) {
         for (c, &v) in self.coarse.iter_mut().zip(values) {
             *c = Complex64::new(f64::from(v), 0.0);
         }
-        forward.process_with_scratch(&mut self.coarse, &mut self.scratch);
+        self.forward.transform(&mut self.coarse);
         self.fine.fill(Complex64::default());
         let n = self.fine.len();
         for (k, (&c, &t)) in self.coarse.iter().zip(transfer).enumerate() {
@@ -199,7 +187,7 @@ impl Buffers {
                 self.fine[n - k] = c.conj() * t;
             }
         }
-        backward.process_with_scratch(&mut self.fine, &mut self.scratch);
+        self.backward.transform(&mut self.fine);
     }
 }
 

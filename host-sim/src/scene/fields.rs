@@ -1,8 +1,7 @@
 //! Random fields and their blurring: what speckle and photographs are made of.
 
 use rand_distr::{Distribution, StandardNormal};
-use rustfft::num_complex::Complex64;
-use rustfft::{FftDirection, FftPlannerScalar};
+use rowtone_fourier::{Complex64, Fourier};
 
 use crate::random::stream;
 
@@ -20,7 +19,7 @@ pub(super) fn one_over_f(width: usize, rows: usize, power: f64, seed: u64) -> Ve
         .iter()
         .map(|&v| Complex64::new(f64::from(v), 0.0))
         .collect();
-    transform(&mut field, width, height, FftDirection::Forward);
+    transform(&mut field, width, height, Fourier::forward);
     for (i, c) in field.iter_mut().enumerate() {
         let turn = |k: usize, n: usize| k.min(n - k) as f64 / n as f64;
         let (fx, fy) = (turn(i % width, width), turn(i / width, height));
@@ -32,7 +31,7 @@ pub(super) fn one_over_f(width: usize, rows: usize, power: f64, seed: u64) -> Ve
         };
         *c *= gain;
     }
-    transform(&mut field, width, height, FftDirection::Inverse);
+    transform(&mut field, width, height, Fourier::inverse);
     let out: Vec<f64> = field.iter().take(width * rows).map(|c| c.re).collect();
     let n = out.len() as f64;
     let mean = out.iter().sum::<f64>() / n;
@@ -47,17 +46,16 @@ pub(super) fn transform(
     field: &mut [Complex64],
     width: usize,
     height: usize,
-    direction: FftDirection,
+    direction: fn(usize) -> Fourier,
 ) {
-    let mut planner = FftPlannerScalar::new();
-    planner.plan_fft(width, direction).process(field);
-    let along = planner.plan_fft(height, direction);
+    direction(width).transform(field);
+    let mut along = direction(height);
     let mut column = vec![Complex64::default(); height];
     for x in 0..width {
         for (c, row) in column.iter_mut().zip(field.chunks(width)) {
             *c = row[x];
         }
-        along.process(&mut column);
+        along.transform(&mut column);
         for (c, row) in column.iter().zip(field.chunks_mut(width)) {
             row[x] = *c;
         }

@@ -1,6 +1,6 @@
 //! Where the stripes are: a first guess of their number in a frame, from the periodogram.
 
-use rustfft::{FftPlanner, num_complex::Complex};
+use rowtone_fourier::{Complex64, Fourier};
 
 /// Power of all frames against stripes per row: `(stripes per row of bin 1, power of each bin)`, up to half a stripe a row.
 ///
@@ -8,17 +8,17 @@ use rustfft::{FftPlanner, num_complex::Complex};
 pub fn periodogram(frames: &[Vec<f64>]) -> (f64, Vec<f64>) {
     let rows = frames.first().map_or(0, Vec::len);
     let size = (8 * rows.max(1)).next_power_of_two();
-    let fft = FftPlanner::new().plan_fft_forward(size);
+    let mut fourier = Fourier::forward(size);
     let mut power = vec![0.0; size / 2];
     for frame in frames {
-        let mut buffer = vec![Complex::new(0.0, 0.0); size];
+        let mut buffer = vec![Complex64::default(); size];
         for (y, (slot, &value)) in buffer.iter_mut().zip(frame).enumerate() {
             let taper = (std::f64::consts::PI * (y as f64 + 0.5) / rows as f64)
                 .sin()
                 .powi(2);
             slot.re = value * taper;
         }
-        fft.process(&mut buffer);
+        fourier.transform(&mut buffer);
         for (sum, value) in power.iter_mut().zip(&buffer) {
             *sum += value.norm_sqr();
         }

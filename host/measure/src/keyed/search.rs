@@ -1,6 +1,6 @@
 //! Which tones the key frames hold.
 
-use rustfft::{FftPlanner, num_complex::Complex32};
+use rowtone_fourier::{Complex64, Fourier};
 
 use super::data::Data;
 use super::fit::{Design, Fitted, Orbit};
@@ -223,10 +223,10 @@ fn peaks(data: &Data, residual: &[f64], (low, high): (f64, f64)) -> Vec<f64> {
         .next_power_of_two()
         .min(POINTS);
     let first_s = data.all.first().map_or(0.0, |datum| datum.t_s);
-    let fft = FftPlanner::new().plan_fft_forward(n);
+    let mut fourier = Fourier::forward(n);
     let mut found: Vec<(f64, f64)> = Vec::new();
     for axis in 0..2 {
-        let mut line = vec![Complex32::default(); n];
+        let mut line = vec![Complex64::default(); n];
         let mut total = 0.0;
         for (datum, r) in data
             .all
@@ -236,18 +236,15 @@ fn peaks(data: &Data, residual: &[f64], (low, high): (f64, f64)) -> Vec<f64> {
         {
             let at = ((datum.t_s - first_s) / step_s).round() as usize;
             if let Some(slot) = line.get_mut(at) {
-                slot.re += (datum.weight * r) as f32;
+                slot.re += datum.weight * r;
                 total += datum.weight;
             }
         }
         if total <= 0.0 {
             continue;
         }
-        fft.process(&mut line);
-        let power: Vec<f64> = line[..n / 2]
-            .iter()
-            .map(|z| f64::from(z.norm_sqr()) / total)
-            .collect();
+        fourier.transform(&mut line);
+        let power: Vec<f64> = line[..n / 2].iter().map(|z| z.norm_sqr() / total).collect();
         let bin_hz = 1.0 / (step_s * n as f64);
         for (k, w) in (1..).zip(power.windows(3)) {
             let hz = k as f64 * bin_hz;

@@ -3,8 +3,8 @@
 //! In each block, the strongest tone of what is left is taken, all tones found so far are fitted together (amplitudes
 //! by linear least squares, frequencies by Gauss–Newton), and so on. Blocks overlap by half and are cross-faded.
 
+use rowtone_fourier::{Complex64, Fourier};
 use rowtone_linear::{Symmetric, dot};
-use rustfft::{FftPlanner, num_complex::Complex};
 use std::f64::consts::TAU;
 
 /// Samples in a block.
@@ -159,7 +159,7 @@ fn refined(known: &[(f64, f64)], omegas: &[f64], amplitudes: &[f64]) -> Vec<f64>
 /// The strongest frequency of uneven samples, from a padded transform with zeros in the gaps.
 fn strongest(residual: &[(f64, f64)], length: usize) -> f64 {
     let size = (4 * length).next_power_of_two();
-    let mut buffer = vec![Complex::new(0.0, 0.0); size];
+    let mut buffer = vec![Complex64::default(); size];
     let mean = dot(
         &residual.iter().map(|r| r.1).collect::<Vec<_>>(),
         &vec![1.0; residual.len()],
@@ -167,9 +167,7 @@ fn strongest(residual: &[(f64, f64)], length: usize) -> f64 {
     for &(t, v) in residual {
         buffer[t as usize].re = v - mean;
     }
-    FftPlanner::new()
-        .plan_fft_forward(size)
-        .process(&mut buffer);
+    Fourier::forward(size).transform(&mut buffer);
     let peak = (2..size / 2)
         .max_by(|&a, &b| buffer[a].norm_sqr().total_cmp(&buffer[b].norm_sqr()))
         .unwrap_or(2);

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 use std::ops::Range;
 
-use rustfft::{FftPlanner, num_complex::Complex32, num_complex::Complex64};
+use rowtone_fourier::{Complex64, Fourier};
 
 use super::rectangle::Tile;
 use super::shifts::Shifts;
@@ -222,7 +222,7 @@ fn points(shifts: &Shifts) -> usize {
 /// Power of each strip's pulls against frequency, up to half the groups' rate.
 fn spectra(shifts: &Shifts) -> Vec<Vec<f32>> {
     let n = points(shifts);
-    let fft = FftPlanner::new().plan_fft_forward(n);
+    let mut fourier = Fourier::forward(n);
     let times = shifts
         .within_s
         .iter()
@@ -231,19 +231,20 @@ fn spectra(shifts: &Shifts) -> Vec<Vec<f32>> {
     let mut spectra = Vec::new();
     // Two strips at once: one as the real part, one as the imaginary.
     for pair in shifts.pulls.chunks(2) {
-        let mut line = vec![Complex32::default(); n];
+        let mut line = vec![Complex64::default(); n];
         let second = pair.last().filter(|_| pair.len() == 2);
         for (k, (&slot, &pull)) in slots.iter().zip(&pair[0]).enumerate() {
             if let Some(slot) = line.get_mut(slot) {
-                *slot += Complex32::new(pull, second.map_or(0.0, |second| second[k]));
+                let second = second.map_or(0.0, |second| second[k]);
+                *slot += Complex64::new(f64::from(pull), f64::from(second));
             }
         }
-        fft.process(&mut line);
-        let half = |sign: f32| -> Vec<f32> {
+        fourier.transform(&mut line);
+        let half = |sign: f64| -> Vec<f32> {
             let mirrored = (0..n / 2).map(|k| line[(n - k) % n].conj());
             line.iter()
                 .zip(mirrored)
-                .map(|(a, b)| (a + b * sign).norm_sqr() * 0.25)
+                .map(|(a, b)| ((a + b * sign).norm_sqr() * 0.25) as f32)
                 .collect()
         };
         spectra.push(half(1.0));
