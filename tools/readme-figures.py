@@ -22,7 +22,7 @@ SENSORS = {
     "imx708": "IMX708 1536x864",
     "hm01b0": "HM01B0 320x240 (microcontroller)",
 }
-SIMULATE = "simulate --seconds 8 --tone 24.7:0.3 --tone 49.4:0.08 --tone 311.3:0.015 --tone 187.4:0.04 -o clip.y4m"
+SIMULATE = "simulate --seconds 8 --tone 24.7:0.3 --tone 49.4:0.08 --tone 317.6:0.015 --tone 187.4:0.04 -o clip.y4m"
 ANALYZE = "analyze clip.y4m --line-time-us 40 --exposure-us 500 --hop 0.25 --max-hz 500 --plot analyze.png"
 
 
@@ -36,8 +36,9 @@ def indented(text):
 
 
 def demo(folder):
-    """The demo's first window."""
-    return indented("\n\n".join(rowtone(folder).split("\n\n")[:2]) + "\n...")
+    """The demo's first window and its end."""
+    parts = rowtone(folder).strip().split("\n\n")
+    return indented("\n\n".join([*parts[:2], "...", *parts[-2:]]))
 
 
 def picture(folder):

@@ -1,7 +1,8 @@
 //! `rowtone demo`: the whole chain on a simulated camera, its peaks beside the truth.
 //!
 //! The simulated camera's frames go through a pipe as a Y4M stream, are read, tracked and analysed as
-//! any recording is, and every report is printed as the sentence that a board would send.
+//! any recording is. Every window is a table for people; at the end stands the line that a board
+//! would send of the last one.
 
 use std::io::{self, BufWriter, PipeWriter, Write};
 
@@ -40,7 +41,8 @@ const TONES: [Tone; 3] = [
         phase_rad: 1.0,
     },
     Tone {
-        hz: 311.3,
+        // Far from all that the other two could be taken for at 60 fps.
+        hz: 317.6,
         amplitude_px: 0.015,
         phase_rad: 2.0,
     },
@@ -66,9 +68,9 @@ pub fn run(_args: &Args) -> Result<(), Failure> {
 
     let mut out = Out::default();
     out.line(&format!(
-        "A simulated camera ({} x {} px, {} fps, {} us a row) looks at a simulated machine for \
-         {SECONDS} s.\nEvery window: the sentence that a board would send, then its peaks beside \
-         the truth.",
+        "A simulated camera looks at a simulated machine for {SECONDS} s: {} x {} px, {} fps, \
+         {} us a row.\nIt sees the machine only while it reads a picture out, yet each row \
+         is a look of its own.",
         sensor.cols,
         sensor.rows,
         sensor.fps,
@@ -89,16 +91,21 @@ pub fn run(_args: &Args) -> Result<(), Failure> {
     let mut memory = plan.memory();
     let mut analysis = Analysis::new(shifts, &plan, &mut memory)?;
     let progress = Progress::new(Some(u64::from(SECONDS * 60)));
+    let mut last = None;
     analysis.run(|event| {
         match event {
             Event::Part(_) => {}
             Event::Note(note) => progress.note(note),
             Event::Frame(_) => progress.step(),
             Event::Sample(_) => {}
-            Event::Report(report, _) => progress.aside(|| show(report, &mut out))?,
+            Event::Report(report, _) => {
+                last = Some(report.clone());
+                progress.aside(|| show(report, &mut out))?;
+            }
         }
-        Ok(())
-    })
+        Ok::<_, Failure>(())
+    })?;
+    last.map_or(Ok(()), |report| close(report, &mut out))
 }
 
 /// Writes the recording, frame by frame.
@@ -111,17 +118,17 @@ fn film(camera: &host_sim::Camera, to: PipeWriter) -> io::Result<()> {
     to.flush()
 }
 
-/// Prints a report as a sentence and as a table.
+/// Prints a report as a table beside the truth.
 fn show(report: &Report, out: &mut Out) -> Result<(), Failure> {
-    let mut sentence = String::new();
-    let message = Message::Report {
-        session: 1,
-        report: report.clone(),
-    };
-    wire_text::encode(&message, &mut sentence)
-        .map_err(|error| Failure::input(format!("demo: {error}")))?;
+    let end_s = report.time_ms as f64 * 1e-3;
+    let window_s = f64::from(report.window_s);
     out.line("")?;
-    out.line(sentence.trim_end())?;
+    out.line(&format!(
+        "Second {:.1} to {end_s:.1}: {} rows, a row's noise {:.4} px",
+        end_s - window_s,
+        report.lines,
+        report.noise_px,
+    ))?;
     out.line(
         "    measured, Hz        true, Hz  error, mHz | measured, px        true, px  error, %",
     )?;
@@ -140,6 +147,16 @@ fn show(report: &Report, out: &mut Out) -> Result<(), Failure> {
         ))?;
     }
     Ok(())
+}
+
+/// Prints the last report as the line that a board sends.
+fn close(report: Report, out: &mut Out) -> Result<(), Failure> {
+    let mut sentence = String::new();
+    let message = Message::Report { session: 1, report };
+    wire_text::encode(&message, &mut sentence)
+        .map_err(|error| Failure::input(format!("demo: {error}")))?;
+    out.line("\nA board sends the last window over its serial line like this:\n")?;
+    out.line(sentence.trim_end())
 }
 
 /// One tone of the machine beside the peak that shows it.
