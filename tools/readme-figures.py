@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Measures the figures in README.md again and writes them, and the picture in docs/, anew.
+"""Measures the figures in README.md and docs/desktop.md again and writes them, and the picture in docs/, anew.
 
     cargo build --release -p rowtone-cli && python3 tools/readme-figures.py
 
-What stands between <!-- NAME --> and <!-- /NAME --> in README.md is replaced.
+What stands between <!-- NAME --> and <!-- /NAME --> in these pages is replaced.
 """
 import json
 import os
@@ -71,18 +71,32 @@ def sensors(folder):
     return "\n".join(rows)
 
 
+def sample(folder):
+    """A clip, and what the program says of its first window."""
+    commands = [
+        "simulate --seconds 3 --tone 24.7:0.3 --tone 49.4:0.08 --tone 317.6:0.015 -o clip.y4m",
+        "analyze clip.y4m --line-time-us 40 --exposure-us 500 --um-per-px 100",
+    ]
+    said = [rowtone(folder, *command.split()) for command in commands][-1].rstrip().split("\n")
+    windows = [number for number, line in enumerate(said) if not line.startswith("     ")]
+    shown = [*said[: windows[1]], "    ...", *said[windows[-1] :]]
+    return "\n".join([f"    rowtone {command}" for command in commands] + [""] + ["    " + line for line in shown])
+
+
 def main():
-    page = ROOT / "README.md"
-    text = page.read_text()
+    pages = [ROOT / "README.md", ROOT / "docs" / "desktop.md"]
+    texts = [page.read_text() for page in pages]
     with tempfile.TemporaryDirectory() as folder:
         folder = pathlib.Path(folder)
-        for part in (demo, picture, sensors):
+        for part in (demo, picture, sample, sensors):
             name = part.__name__
             pattern = re.compile(rf"<!-- {name} -->.*?<!-- /{name} -->", re.S)
             new = f"<!-- {name} -->\n\n{part(folder)}\n\n<!-- /{name} -->"
-            text, count = pattern.subn(lambda _: new, text)
-            assert count == 1, f"README.md has no place for {name}"
-    page.write_text(text)
+            replaced = [pattern.subn(lambda _: new, text) for text in texts]
+            assert sum(count for _, count in replaced) == 1, f"no page has one place for {name}"
+            texts = [text for text, _ in replaced]
+    for page, text in zip(pages, texts):
+        page.write_text(text)
 
 
 if __name__ == "__main__":
