@@ -123,6 +123,33 @@ fn tones_are_found_and_what_stands_still_is_said_to() {
 }
 
 #[test]
+fn every_file_is_what_its_ending_says() {
+    let clip = file("shapes-files.y4m", &y4m(bending(HZ, 30)));
+    let written = |ending: &str| {
+        let out = clip.with_extension(ending);
+        let more = ["--hz", "131.7", "-o", out.to_str().expect("a path")];
+        let output = on_clip("shapes", &clip, &more);
+        assert!(output.status.success(), "{output:?}");
+        std::fs::read(&out).expect("a file")
+    };
+    assert!(written("gif").starts_with(b"GIF89a"));
+    let npz = written("npz");
+    assert!(npz.starts_with(b"PK\x03\x04") && npz.windows(6).any(|w| w == b"hz.npy"));
+    let unv = String::from_utf8(written("unv")).expect("text");
+    assert!(unv.lines().all(|line| line.len() <= 80 && line.is_ascii()));
+    let datasets: Vec<&str> = unv
+        .lines()
+        .zip(unv.lines().skip(1))
+        .filter(|(mark, next)| mark.trim() == "-1" && next.trim() != "-1")
+        .map(|(_, kind)| kind.trim())
+        .collect();
+    assert_eq!(datasets[..3], ["151", "164", "15"]);
+    let count = |kind| datasets.iter().filter(|d| **d == kind).count();
+    // 6 columns and 7 rows of tiles.
+    assert_eq!([count("82"), count("55"), count("58")], [13, 1, 84]);
+}
+
+#[test]
 fn what_cannot_be_told_is_refused_in_one_line() {
     let clip = file("shapes-refused.y4m", &y4m(bending(HZ, 30)));
     let refused = |more: &[&str], status, words: &[&str]| {

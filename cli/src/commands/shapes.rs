@@ -1,6 +1,8 @@
 //! `rowtone shapes`: what vibrates where.
 
 mod json;
+mod npz;
+mod unv;
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -14,17 +16,20 @@ use crate::output::Out;
 use crate::output::progress::Progress;
 use rowtone_files::WholeFile;
 use rowtone_measure::shapes::{self, Shape, Shapes, Wanted};
-use rowtone_plot::{Panel, Plate};
+use rowtone_plot::{Animation, Panel, Plate};
 
 /// Options of `rowtone shapes`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     rowtone shapes clip.mp4 --line-time-us 18.9 --exposure-us 500 -o shape.png\n  \
-    rowtone shapes clip.y4m --line-time-us 18.9 --hz 131.7,1017 --format json\n\n\
+    rowtone shapes clip.y4m --line-time-us 18.9 --hz 131.7,1017 --format json\n  \
+    rowtone shapes clip.y4m --line-time-us 18.9 --hz 131.7 -o swings.gif\n\n\
     A picture is cut into tiles, and each tile tells its own amplitude and phase, far beyond half the\n\
     frame rate: its rows are exposed one after the other. JSON: a list with one object a tone, whose\n\
     lists x, y and sd hold one entry a tile, row by row, px; motion is Re (re + i*im)*e^(2 pi i f t),\n\
     exposure undone, phase against the largest tile. null: outside --roi, or too little texture.\n\n\
+    Files: .png and .svg show all tones side by side; .gif and .y4m a mesh that swings, slowed and\n\
+    enlarged; .npz is for NumPy, .unv (UFF 15, 55, 58, 82, 151, 164) for modal analysis.\n\n\
     The recording is read three times, so it must be a file. What --roi leaves to the program (auto)\n\
     is where tones are looked for; tiles cover the whole picture. Two tones whose sum or difference is\n\
     a multiple of the frame rate cannot be told apart, and are refused.")]
@@ -45,7 +50,7 @@ pub struct Args {
     #[arg(long, value_enum, default_value = "text")]
     format: Format,
     /// Writes the shapes to a file, by its ending
-    #[arg(short, long, value_name = "FILE.png|.svg|.json")]
+    #[arg(short, long, value_name = "FILE.png|.svg|.gif|.y4m|.json|.npz|.unv")]
     output: Option<PathBuf>,
 }
 
@@ -60,7 +65,11 @@ enum Format {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
     Json,
+    Npz,
+    Unv,
     Picture,
+    Gif,
+    Y4m,
 }
 
 impl Kind {
@@ -69,9 +78,14 @@ impl Kind {
         let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase());
         match ending.as_deref() {
             Some("json") => Ok(Self::Json),
+            Some("npz") => Ok(Self::Npz),
+            Some("unv") => Ok(Self::Unv),
+            Some("gif") => Ok(Self::Gif),
+            Some("y4m") => Ok(Self::Y4m),
             Some("png" | "svg") => Ok(Self::Picture),
             _ => Err(Failure::usage(format!(
-                "-o {}: its ending says what is written: .png, .svg or .json",
+                "-o {}: its ending says what is written: .png, .svg, .gif, .y4m, .json, \
+                 .npz or .unv",
                 path.display()
             ))),
         }
@@ -105,19 +119,43 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     }
     drop(progress);
     if let (Some(kind), Some(path)) = (kind, &args.output) {
-        match kind {
-            Kind::Json => write(path, json::text(&shapes).as_bytes())?,
-            Kind::Picture => rowtone_plot::write(path, &plate(&shapes))?,
-        }
+        save(kind, path, &shapes, args)?;
     }
     let mut out = Out::default();
     match args.format {
-        Format::Json => out.line(json::text(&shapes).trim_end()),
+        Format::Json => out.line(json::text(&shapes, args.camera.um_per_px()).trim_end()),
         Format::Text => shapes
             .shapes
             .iter()
             .try_for_each(|shape| out.line(&sentence(shape, &shapes))),
     }
+}
+
+fn save(kind: Kind, path: &Path, shapes: &Shapes, args: &Args) -> Result<(), Failure> {
+    let um_per_px = args.camera.um_per_px();
+    let failed = |why: &dyn std::fmt::Display| {
+        Failure::input(format!("{}: cannot be drawn: {why}", path.display()))
+    };
+    let mut bytes = Vec::new();
+    let memory = |e| Failure::writing(&path.display().to_string(), &e);
+    match kind {
+        Kind::Picture => return Ok(rowtone_plot::write(path, &plate(shapes))?),
+        Kind::Json => bytes = json::text(shapes, um_per_px).into_bytes(),
+        Kind::Npz => npz::write(&mut bytes, shapes, um_per_px).map_err(memory)?,
+        Kind::Unv => {
+            let name = args.camera.options().name().to_owned();
+            unv::write(&mut bytes, shapes, &name, um_per_px).map_err(memory)?;
+        }
+        Kind::Gif | Kind::Y4m => {
+            let plate = plate(shapes);
+            let animation = Animation::new(&plate).map_err(|e| failed(&e))?;
+            bytes = match kind {
+                Kind::Gif => rowtone_plot::gif(&animation).map_err(|e| failed(&e))?,
+                _ => rowtone_plot::y4m(&animation),
+            };
+        }
+    }
+    write(path, &bytes)
 }
 
 fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
@@ -140,6 +178,7 @@ fn plate(shapes: &Shapes) -> Plate<'_> {
         };
         Panel {
             title: sentence(shape, shapes).trim_start().to_owned(),
+            hz: shape.hz,
             tiles: (0..shape.moves.len()).map(tile).collect(),
         }
     };

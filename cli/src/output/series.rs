@@ -5,6 +5,7 @@
 
 use std::io::{self, Write};
 
+use super::npy;
 use rowtone::timeline::Vertical;
 use rowtone::tracker::Axes;
 
@@ -266,20 +267,8 @@ impl Series {
     /// # Errors
     /// What writing says.
     pub fn write_npy(&self, to: &mut impl Write) -> io::Result<()> {
-        // NumPy's format version 1.0: magic, version, header length, a Python dictionary that is
-        // padded so that the data start at a multiple of 64.
-        let mut header = format!(
-            "{{'descr': '<f8', 'fortran_order': False, 'shape': ({}, {}), }}",
-            self.px.len(),
-            if self.vertical.is_some() { 6 } else { 4 }
-        );
-        let before = 10;
-        let padding = 64 - (before + header.len() + 1) % 64;
-        header.extend(std::iter::repeat_n(' ', padding % 64));
-        header.push('\n');
-        to.write_all(b"\x93NUMPY\x01\x00")?;
-        to.write_all(&(header.len() as u16).to_le_bytes())?;
-        to.write_all(header.as_bytes())?;
+        let columns = if self.vertical.is_some() { 6 } else { 4 };
+        npy::write_head(to, "<f8", &[self.px.len(), columns])?;
         for Sample {
             t_s,
             row,

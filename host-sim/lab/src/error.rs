@@ -7,6 +7,7 @@ use host_sim::SimError;
 use rowtone::camera::TimingError;
 use rowtone_clip::ClipError;
 use rowtone_measure::MeasureError;
+use rowtone_measure::shapes::ShapesError;
 use rowtone_plot::PlotError;
 
 /// Why a recording cannot be made, measured or written down.
@@ -25,6 +26,8 @@ pub enum LabError {
     Timing(TimingError),
     /// A recording cannot be measured.
     Measure(MeasureError),
+    /// The shapes of a recording cannot be had.
+    Shapes(ShapesError),
     /// No frame of a simulated recording arrives.
     NoFrame,
     /// No report came of a simulated recording.
@@ -74,6 +77,12 @@ impl From<MeasureError> for LabError {
     }
 }
 
+impl From<ShapesError> for LabError {
+    fn from(error: ShapesError) -> Self {
+        Self::Shapes(error)
+    }
+}
+
 impl From<ClipError> for LabError {
     fn from(error: ClipError) -> Self {
         Self::Measure(error.into())
@@ -93,6 +102,7 @@ impl fmt::Display for LabError {
             Self::Recording { what, why } => write!(f, "{what}: {why}"),
             Self::Timing(error) => error.fmt(f),
             Self::Measure(error) => error.fmt(f),
+            Self::Shapes(error) => error.fmt(f),
             Self::NoFrame => f.write_str("the simulated recording: no frame arrives"),
             Self::NoReport => f.write_str("the simulated recording: no report came"),
             Self::Open { path, why } => write!(f, "{}: cannot be opened: {why}", path.display()),

@@ -4,6 +4,7 @@
 //! - [`experiments`]: the thesis's chapter 5 again; [`figure`]: drawings for both;
 //! - [`line_scenes`]: recordings with known motion through the tracker, for the line engine's figures;
 //! - [`spectrum_scenes`]: random displacement samples with known tones, for the spectrum's figures;
+//! - [`shape_scenes`]: parts that vibrate in known shapes, for the figures of `rowtone shapes`;
 //! - [`calibrations`]: calibrations of simulated cameras, with the truth;
 //! - [`sound`]: speech and music, and how well a recovered sound agrees with them.
 
@@ -13,6 +14,7 @@ pub mod experiments;
 pub mod figure;
 pub mod line_scenes;
 pub mod methods;
+pub mod shape_scenes;
 pub mod sound;
 pub mod spectrum_scenes;
 

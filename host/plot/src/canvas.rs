@@ -15,7 +15,7 @@ use crate::glyphs;
 type Drawn = Result<(), DrawingErrorKind<Infallible>>;
 
 /// A picture in the making, RGB with 8 bits, white at first.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Canvas {
     size: (u32, u32),
     scale: f32,
@@ -122,6 +122,14 @@ impl Canvas {
         (self.width as u32, self.height as u32, &self.pixels)
     }
 
+    /// Sets one pixel; nothing outside the picture.
+    pub(crate) fn set(&mut self, x: usize, y: usize, rgb: [u8; 3]) {
+        if x < self.width && y < self.height {
+            let at = 3 * (y * self.width + x);
+            self.pixels[at..at + 3].copy_from_slice(&rgb);
+        }
+    }
+
     /// A place in pixels. What lies far outside is moved nearer, so that it costs no time.
     fn place(&self, (x, y): BackendCoord) -> Point {
         let far = |v: i32, size: usize| {
@@ -157,7 +165,7 @@ impl Canvas {
     }
 
     /// A line through some places, in drawing units wide.
-    fn stroke(&mut self, points: &[Point], width: u32, colour: BackendColor) {
+    pub(crate) fn stroke(&mut self, points: &[Point], width: u32, colour: BackendColor) {
         let Some(around) = bounds(points) else {
             return;
         };

@@ -1,12 +1,15 @@
 //! A recording as a picture: spectrum, displacement over a few frames, spectrogram.
 //!
 //! A [`Picture`] is shown every sample and every report and drawn at the end. It keeps the samples of
-//! one window and a bounded number of spectra, so it does not grow with the recording. A [`Plate`] shows the shapes of tones.
+//! one window and a bounded number of spectra, so it does not grow with the recording. A [`Plate`] shows the shapes of tones, an
+//! [`Animation`] lets them swing.
 
+mod animation;
 mod canvas;
 mod draw;
 mod error;
 mod file;
+mod film;
 mod glyphs;
 mod plate;
 mod residual;
@@ -18,10 +21,12 @@ use std::path::PathBuf;
 use rowtone::report::Report;
 use rowtone::timeline::Sample;
 
+pub use animation::Animation;
 pub use error::{DrawError, PlotError};
 pub use plate::{Panel, Phasors, Plate};
 
 pub use file::{Drawing, check_ending, png, svg, write};
+pub use film::{gif, y4m};
 
 use self::residual::Fit;
 use self::spectrogram::Spectrogram;

@@ -31,6 +31,8 @@ pub type Phasors = [[f64; 2]; 2];
 pub struct Panel {
     /// What to write above.
     pub title: String,
+    /// Frequency of the tone, Hz.
+    pub hz: f64,
     /// Of each tile, row by row; `None` where nothing moves, which is not drawn.
     pub tiles: Vec<Option<Phasors>>,
 }
@@ -48,10 +50,27 @@ pub struct Plate<'a> {
     pub panels: Vec<Panel>,
 }
 
+impl Panel {
+    /// The largest semi-axis of all tiles, px.
+    pub(crate) fn largest_px(&self) -> f64 {
+        self.tiles
+            .iter()
+            .flatten()
+            .map(semi_major)
+            .fold(0.0, f64::max)
+    }
+}
+
 impl Plate<'_> {
-    fn across(&self) -> usize {
+    /// Pictures side by side.
+    pub(crate) fn across(&self) -> usize {
         let panels = self.panels.len().max(1);
         (1..).find(|n| n * n >= panels).unwrap_or(1)
+    }
+
+    /// Tiles side by side.
+    pub(crate) fn columns(&self) -> usize {
+        (self.size.0 / self.tile_px.max(1)).max(1)
     }
 
     /// Units of the drawing for a px of the picture.
@@ -88,12 +107,7 @@ impl Drawing for Plate<'_> {
                 plate: self,
                 panel,
                 corner: (corner.0 + LEFT, corner.1 + ABOVE),
-                largest_px: panel
-                    .tiles
-                    .iter()
-                    .flatten()
-                    .map(semi_major)
-                    .fold(0.0, f64::max),
+                largest_px: panel.largest_px(),
             };
             sheet.draw(root)?;
         }
@@ -101,8 +115,25 @@ impl Drawing for Plate<'_> {
     }
 }
 
+/// Grey values that are drawn as dark and as bright: all but a hundredth of the pixels lie within, on each side.
+pub(crate) fn range_of(picture: &[f32]) -> [f64; 2] {
+    let mut sorted: Vec<f32> = picture.iter().step_by(7).copied().collect();
+    sorted.sort_by(f32::total_cmp);
+    let quantile = |share: usize| {
+        let at = sorted.get(sorted.len() * share / 100);
+        f64::from(at.copied().unwrap_or(0.0))
+    };
+    [quantile(1), quantile(99).max(quantile(1) + 1.0)]
+}
+
+/// Length of the scale under a picture of this width, px.
+pub(crate) fn scale_bar_px(width: usize) -> usize {
+    let lengths = [200, 100, 50, 20, 10];
+    lengths.into_iter().find(|&px| px * 4 <= width).unwrap_or(5)
+}
+
 /// The larger semi-axis of an orbit.
-fn semi_major([x, y]: &Phasors) -> f64 {
+pub(crate) fn semi_major([x, y]: &Phasors) -> f64 {
     let sum = x[0] * x[0] + x[1] * x[1] + y[0] * y[0] + y[1] * y[1];
     let re = x[0] * x[0] - x[1] * x[1] + y[0] * y[0] - y[1] * y[1];
     let im = 2.0 * (x[0] * x[1] + y[0] * y[1]);
@@ -144,17 +175,7 @@ impl Sheet<'_> {
         let tile = self.plate.tile_px;
         let piece = (tile / 4).max(2);
         let columns = width / tile;
-        let mut sorted: Vec<f32> = self.plate.picture.iter().step_by(7).copied().collect();
-        sorted.sort_by(f32::total_cmp);
-        let quantile = |share: usize| {
-            f64::from(
-                sorted
-                    .get(sorted.len() * share / 100)
-                    .copied()
-                    .unwrap_or(0.0),
-            )
-        };
-        let (dark, bright) = (quantile(1), quantile(99).max(quantile(1) + 1.0));
+        let [dark, bright] = range_of(self.plate.picture);
         for y in (0..height).step_by(piece) {
             for x in (0..width).step_by(piece) {
                 let (x_to, y_to) = ((x + piece).min(width), (y + piece).min(height));
@@ -261,10 +282,7 @@ impl Sheet<'_> {
             root.draw(&Text::new(format!("{px:.3}"), (bar + 19, y), font(13)))?;
         }
         root.draw(&Text::new("px", (bar, top - 20), font(13)))?;
-        let length = [200, 100, 50, 20, 10]
-            .into_iter()
-            .find(|&px| px * 4 <= width)
-            .unwrap_or(5);
+        let length = scale_bar_px(width);
         let (from, to) = (
             self.at(0.0, height as f64),
             self.at(length as f64, height as f64),
@@ -294,6 +312,7 @@ mod tests {
             panels: vec![
                 Panel {
                     title: "131.700 Hz".to_owned(),
+                    hz: 131.7,
                     tiles: vec![None, Some([[0.05, 0.0], [0.0, 0.02]])],
                 };
                 3

@@ -16,10 +16,13 @@ struct Object {
     x_sd: Vec<Option<f64>>,
     y_sd: Vec<Option<f64>>,
     moves: Vec<bool>,
+    /// µm a px, where it is known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    um_per_px: Option<f64>,
 }
 
 /// A list with one object a tone, and a line feed.
-pub(super) fn text(shapes: &Shapes) -> String {
+pub(super) fn text(shapes: &Shapes, um_per_px: Option<f64>) -> String {
     let objects: Vec<Object> = shapes
         .shapes
         .iter()
@@ -43,6 +46,7 @@ pub(super) fn text(shapes: &Shapes) -> String {
                 x_sd: rounded(&shape.x_sd),
                 y_sd: rounded(&shape.y_sd),
                 moves: shape.moves.clone(),
+                um_per_px,
             }
         })
         .collect();

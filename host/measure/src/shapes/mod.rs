@@ -95,6 +95,8 @@ pub fn semi_major(x: Complex64, y: Complex64) -> f64 {
 /// The shapes of a recording.
 #[derive(Clone, Debug)]
 pub struct Shapes {
+    /// Frame rate, Hz.
+    pub fps: f64,
     /// How the turned picture is cut.
     pub grid: Grid,
     /// One shape a tone: in the order asked for, or the largest first.
@@ -121,7 +123,7 @@ pub fn measure(
     options: &CameraOptions,
     wanted: &Wanted,
     stop: &Arc<AtomicBool>,
-    mut step: impl FnMut(),
+    step: impl FnMut(),
 ) -> Result<Shapes, ShapesError> {
     if options.is_pipe() {
         return Err(ShapesError::Pipe);
@@ -129,8 +131,20 @@ pub fn measure(
     let open = || {
         let mut feed = Feed::open(options)?;
         feed.stop_when(Arc::clone(stop));
-        Ok::<Feed, ShapesError>(feed)
+        Ok(feed)
     };
+    measure_from(open, wanted, step)
+}
+
+/// As [`measure`], of a recording that `open` opens anew for each reading.
+///
+/// # Errors
+/// As [`measure`].
+pub fn measure_from(
+    open: impl Fn() -> Result<Feed, ShapesError>,
+    wanted: &Wanted,
+    mut step: impl FnMut(),
+) -> Result<Shapes, ShapesError> {
     let feed = open()?;
     let (name, camera) = (feed.name.clone(), feed.camera.clone());
     let (width, height) = camera.size;
@@ -152,6 +166,7 @@ pub fn measure(
     }
     let shapes = fit::shapes(&name, &sums, &tones, &camera)?;
     Ok(Shapes {
+        fps: camera.fps,
         grid,
         shapes,
         bits: camera.bits,
