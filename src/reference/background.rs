@@ -346,13 +346,8 @@ impl Store<'_> {
             (s.coefficients.get_mut(span.clone()), s.tables.get_mut(*row))
         {
             coefficients.copy_from_slice(s.fresh);
+            // Without a print: its sums are others now.
             *slot = *table;
-            // Its sums are others now.
-            s.learning
-                .iter_mut()
-                .skip(*row)
-                .take(1)
-                .for_each(|l| l.print = 0);
             if let (Some(v), &mut Some(built)) = (&mut s.vertical, vertical)
                 && let (Some(coefficients), Some(vertical)) =
                     (v.coefficients.get_mut(span), v.tables.get_mut(*row))
@@ -497,11 +492,7 @@ impl Store<'_> {
                             coefficients.copy_from_slice(fresh);
                         }
                     }
-                    s.learning
-                        .iter_mut()
-                        .skip(*next)
-                        .take(1)
-                        .for_each(|l| l.print = 0);
+                    table.print = 0;
                     *next += 1;
                     *moving = Moving::BEGIN;
                     if *next >= self.rows() {

@@ -14,8 +14,6 @@ pub struct RowLearning {
     smear: u16,
     /// Mean brightness of the lines against the reference.
     pub(super) light: f32,
-    /// Print of the row's last line; 0 where its coefficients are others since.
-    pub(super) print: u32,
     /// Its sharpest pixels, and those that are left out.
     pub(super) watched: Watched,
 }
@@ -43,7 +41,6 @@ impl RowLearning {
         #[cfg(feature = "long-exposure")]
         smear: 0,
         light: 0.0,
-        print: 0,
         watched: Watched::EMPTY,
     };
 

@@ -44,7 +44,7 @@ pub use storage::{StaticStorage, StaticVerticalStorage, Storage, VerticalStorage
 pub(crate) use store::Store;
 pub use vertical::VerticalTable;
 
-/// What the line path needs of a row besides its coefficients: 16 bytes. [`VerticalTable`] is that of its second ones.
+/// What the line path needs of a row besides its coefficients: 20 bytes. [`VerticalTable`] is that of its second ones.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct RowTable {
@@ -56,6 +56,8 @@ pub struct RowTable {
     information_and_offset: Two,
     /// The coefficients of u² in px⁻¹ and of u³ in px⁻².
     quadratic_and_cubic: Two,
+    /// Print of the row's last line; 0 where its coefficients are others since.
+    print: u32,
 }
 
 /// Two numbers of the precision of half an f32, 2⁻⁹. The first is the f32 itself, rounded so that the upper half of the
@@ -92,6 +94,7 @@ impl RowTable {
         pixel_sum: 0.0,
         information_and_offset: Two::ZERO,
         quadratic_and_cubic: Two::ZERO,
+        print: 0,
     };
 
     /// What the row knows of its shift, 1/px²; 0 where it has too little texture to be measured.
@@ -104,8 +107,17 @@ impl RowTable {
     pub(crate) fn without_texture(&self) -> Self {
         Self {
             pixel_sum: self.pixel_sum,
+            print: self.print,
             ..Self::EMPTY
         }
+    }
+
+    /// Becomes `built`, but for the print of the row's last line.
+    pub(super) fn become_built(&mut self, built: Self) {
+        *self = Self {
+            print: self.print,
+            ..built
+        };
     }
 
     /// The row can be measured.
@@ -348,7 +360,7 @@ mod tests {
     }
 
     #[test]
-    fn a_row_is_sixteen_bytes() {
-        assert_eq!(size_of::<RowTable>(), 16);
+    fn a_row_is_twenty_bytes() {
+        assert_eq!(size_of::<RowTable>(), 20);
     }
 }

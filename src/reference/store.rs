@@ -11,12 +11,14 @@ use super::{
 use crate::camera::pixel::Pixel;
 
 /// See the [module](self).
+// In this order in memory: a microcontroller reaches what every line needs, which is first, without a sum.
+#[repr(C)]
 #[derive(Debug)]
 pub(crate) struct Store<'a> {
     pub(super) buffers: Storage<'a>,
-    pub(super) recipe: Recipe,
     /// Pixels of a row.
     pub(super) width: usize,
+    pub(super) recipe: Recipe,
     pub(super) background: Background,
 }
 
@@ -61,6 +63,12 @@ impl<'a> Store<'a> {
     /// From now on the motion may carry so many columns out of the picture.
     pub(crate) fn set_margin_px(&mut self, margin_px: usize) {
         self.recipe.margin_px = margin_px;
+    }
+
+    /// Number of pixels of a row.
+    #[inline(always)]
+    pub(crate) fn width(&self) -> usize {
+        self.width
     }
 
     /// Number of rows.
@@ -111,21 +119,21 @@ impl<'a> Store<'a> {
     /// The print of the row's last line; 0 where there is no such row.
     #[inline(always)]
     pub(crate) fn print(&self, row: usize) -> u32 {
-        self.buffers.learning.get(row).map_or(0, |l| l.print)
+        self.buffers.tables.get(row).map_or(0, |t| t.print)
     }
 
     /// Keeps the print of a row's line; true where it was another.
     #[inline(always)]
     pub(crate) fn replace_print(&mut self, row: usize, print: u32) -> bool {
-        let before = self.buffers.learning.get_mut(row).map(|l| &mut l.print);
+        let before = self.buffers.tables.get_mut(row).map(|t| &mut t.print);
         before.is_some_and(|before| core::mem::replace(before, print) != print)
     }
 
     /// Keeps the print of a row's line.
     #[inline(always)]
     pub(crate) fn set_print(&mut self, row: usize, print: u32) {
-        if let Some(learning) = self.buffers.learning.get_mut(row) {
-            learning.print = print;
+        if let Some(table) = self.buffers.tables.get_mut(row) {
+            table.print = print;
         }
     }
 
@@ -217,7 +225,7 @@ impl<'a> Store<'a> {
                 scratch: b.scratch,
                 coefficients,
             });
-            *slot = table;
+            slot.become_built(table);
         }
     }
 
