@@ -145,7 +145,7 @@ impl Binner {
     }
 
     /// What the tracker says of the rows to come ([`Tracker::curvature`](crate::tracker::Tracker::curvature)).
-    /// [`Tracker::push_into`](crate::tracker::Tracker::push_into) does it itself.
+    /// Rows that come by [`Binner::push_row`] bring it along themselves.
     pub(crate) fn set_curvature(&mut self, curvature: Curvature) {
         self.curvature = curvature;
     }
@@ -222,7 +222,16 @@ impl Binner {
             shift_px,
             information_per_px2,
         } = row;
-        self.push_elsewhere((frame, row), shift_px, information_per_px2, &begin(), done)
+        // One by one, in registers: as structs they would be written to memory for the sake of rows that come here.
+        let Begin {
+            middle_ns,
+            curvature,
+            to_reference,
+            anchor_px,
+        } = begin();
+        let known = (shift_px, information_per_px2);
+        let light = (to_reference, anchor_px);
+        self.push_elsewhere((frame, row), known, middle_ns, curvature, light, done)
     }
 
     /// The row pushed last was exposed so much later than its place says, ns.
@@ -251,37 +260,87 @@ impl Binner {
         frame == self.open.frame && (self.open.first_row..self.open.end_row).contains(&row)
     }
 
-    /// A row that is not the next of its group.
+    /// A row that is not the next of its group. `known`: its shift and information; `light`: its brightness
+    /// ([`Begin::to_reference`]) and anchor.
     #[inline(never)]
     fn push_elsewhere(
         &mut self,
         (frame, row): (u32, u16),
-        shift_px: f32,
-        information_per_px2: f32,
-        begin: &Begin,
+        (shift_px, information_per_px2): (f32, f32),
+        middle_ns: i64,
+        curvature: Curvature,
+        (to_reference, anchor_px): (f32, f32),
         done: &mut Option<Sample>,
     ) -> bool {
-        // One by one, or every row would be written to memory for the sake of those that come here.
+        // The next group's first row: most come so.
+        let follows = frame == self.open.frame && row == self.open.end_row && row > 0;
+        if !follows || !self.open.vertical.is_empty() {
+            let (known, light) = ((shift_px, information_per_px2), (to_reference, anchor_px));
+            return self.push_anyhow((frame, row), known, middle_ns, curvature, light, done);
+        }
         let row = RowShift {
             frame,
             row,
             shift_px,
             information_per_px2,
         };
-        // The next group's first row: most come so.
+        let begin = Begin {
+            middle_ns,
+            curvature,
+            to_reference,
+            anchor_px,
+        };
+        self.push_next_group::<false>(row, &begin, done)
+    }
+
+    /// [`Binner::push_elsewhere`] of any row, and where rows know of the motion along the columns: apart from the others, or
+    /// registers would be kept for it.
+    #[inline(never)]
+    fn push_anyhow(
+        &mut self,
+        (frame, row): (u32, u16),
+        (shift_px, information_per_px2): (f32, f32),
+        middle_ns: i64,
+        curvature: Curvature,
+        (to_reference, anchor_px): (f32, f32),
+        done: &mut Option<Sample>,
+    ) -> bool {
+        let row = RowShift {
+            frame,
+            row,
+            shift_px,
+            information_per_px2,
+        };
+        let begin = Begin {
+            middle_ns,
+            curvature,
+            to_reference,
+            anchor_px,
+        };
         let follows = frame == self.open.frame && row.row == self.open.end_row && row.row > 0;
-        if !follows {
-            return self.push_far(row, begin, done);
+        match follows {
+            true => self.push_next_group::<true>(row, &begin, done),
+            false => self.push_far(row, &begin, done),
         }
+    }
+
+    /// The first row of the next group.
+    #[inline(always)]
+    fn push_next_group<const PLANAR: bool>(
+        &mut self,
+        row: RowShift,
+        begin: &Begin,
+        done: &mut Option<Sample>,
+    ) -> bool {
         self.settle_lateness(&row, begin.to_reference);
-        *done = self.close();
+        let complete = self.close::<PLANAR>(done);
         let open = &mut self.open;
         open.slot += 1;
         open.first_row = row.row;
         open.missing = 0;
         open.first_ns = begin.middle_ns;
-        self.open_with(row, begin);
-        done.is_some()
+        self.open_with::<PLANAR>(row, begin);
+        complete
     }
 
     /// A row that is neither the next of its group nor the first of the next group.
@@ -295,7 +354,7 @@ impl Binner {
             return false;
         }
         self.settle_lateness(&row, begin.to_reference);
-        *done = self.close();
+        let complete = self.close::<true>(done);
         if self.open.frame != row.frame || self.last_frame.is_none() {
             self.count_lost(row.frame);
             self.late_ns = 0.0;
@@ -311,20 +370,20 @@ impl Binner {
             let before_ns = self.group.timing().start_ns(open.missing);
             open.first_ns = begin.middle_ns.saturating_sub(before_ns);
         }
-        self.open_with(row, begin);
-        done.is_some()
+        self.open_with::<true>(row, begin);
+        complete
     }
 
     /// The rest of what begins a group.
     #[inline(always)]
-    fn open_with(&mut self, row: RowShift, begin: &Begin) {
+    fn open_with<const PLANAR: bool>(&mut self, row: RowShift, begin: &Begin) {
         let open = &mut self.open;
         let end_row = open.first_row.saturating_add(self.group.rows_per_sample());
         open.end_row = end_row.min(self.group.timing().rows());
         open.information = Ladder::default();
         open.weighted_shift = 0.0;
         open.weighted_later = 0.0;
-        if !open.vertical.is_empty() {
+        if PLANAR && !open.vertical.is_empty() {
             open.vertical = VerticalSums::default();
         }
         (open.bright_row, open.to_reference) = (row.row, begin.to_reference);
@@ -346,29 +405,34 @@ impl Binner {
 
     /// Gives the group being filled: at the end of the input.
     pub fn finish(&mut self) -> Option<Sample> {
-        self.close()
+        let mut done = None;
+        self.close::<true>(&mut done);
+        done
     }
 
+    /// The group being filled has ended: whether it is complete, in `done` then. `PLANAR`: its rows may know of the motion
+    /// along the columns.
     #[inline(always)]
-    fn close(&mut self) -> Option<Sample> {
+    fn close<const PLANAR: bool>(&mut self, done: &mut Option<Sample>) -> bool {
         let open = &mut self.open;
         if open.end_row == 0 {
-            return None;
+            return false;
         }
         let thick = open.is_thick();
         open.end_row = 0;
         if !thick {
             self.thin_groups = self.thin_groups.saturating_add(1);
-            return None;
+            return false;
         }
         let information_per_px2 = open.information.weight();
-        if information_per_px2 == 0.0 {
-            return self.close_along_columns();
+        if PLANAR && information_per_px2 == 0.0 {
+            *done = self.close_along_columns();
+            return done.is_some();
         }
         let per_information = 1.0 / information_per_px2;
         let shift_px = open.weighted_shift * per_information + open.anchor_px;
         if !shift_px.is_finite() {
-            return None;
+            return false;
         }
         let Moments {
             to_next,
@@ -376,33 +440,30 @@ impl Binner {
             third,
         } = open.information.moments(per_information);
         let rows = f32::from(open.next_row.wrapping_sub(open.first_row)) - to_next;
-        let vertical = (!open.vertical.is_empty()).then(|| {
-            let weighted = open.weighted_shift;
-            let sums = &open.vertical;
-            sums.settle(weighted, information_per_px2, rows, self.line_ns)
-        });
         let own_ns = self.late_ns + open.weighted_later * per_information;
         let later_ns = rows * self.line_ns + own_ns;
-        let later_ns = if later_ns.abs() < 1e9 {
-            // The nearest, as fast as a cast.
-            i64::from((later_ns + 0.5f32.copysign(later_ns)) as i32)
-        } else {
-            rounded_ns(later_ns)
-        };
+        let later_ns = rounded_ns(later_ns);
         let line_ns2 = self.line_ns * self.line_ns;
-        Some(Sample {
+        // Written where it goes, and what few have apart from that: made elsewhere, all of it would be copied.
+        let sample = done.insert(Sample {
             frame: open.frame,
             slot: open.slot,
             curvature: self.curvature,
-            time_ns: open.first_ns.saturating_add(later_ns),
+            time_ns: open.first_ns.wrapping_add(later_ns),
             shift_px,
             information_per_px2,
             spread: Spread {
                 variance_ns2: variance * line_ns2,
                 third_ns3: third * line_ns2 * self.line_ns,
             },
-            vertical,
-        })
+            vertical: None,
+        });
+        if PLANAR && !open.vertical.is_empty() {
+            let (weighted, sums) = (open.weighted_shift, &open.vertical);
+            let vertical = sums.settle(weighted, information_per_px2, rows, self.line_ns);
+            sample.vertical = Some(vertical);
+        }
+        true
     }
 
     /// [`Binner::close`] of a group whose rows know nothing of x: all their edges lie along them.
@@ -417,7 +478,7 @@ impl Binner {
             frame: open.frame,
             slot: open.slot,
             curvature: self.curvature,
-            time_ns: open.first_ns.saturating_add(rounded_ns(later_ns)),
+            time_ns: open.first_ns.wrapping_add(rounded_ns(later_ns)),
             shift_px: 0.0,
             information_per_px2: 0.0,
             spread: self.group.even_spread(),
@@ -447,10 +508,17 @@ impl Binner {
     }
 }
 
-#[cold]
-#[inline(never)]
+/// The nearest whole number of a time below a day, as fast as a cast of 32 bits; 0 for NaN.
+#[inline(always)]
 fn rounded_ns(ns: f32) -> i64 {
-    libm::roundf(ns) as i64
+    if ns.abs() < 1e9 {
+        i64::from((ns + 0.5f32.copysign(ns)) as i32)
+    } else {
+        // A number so large is a multiple of 64.
+        const HIGH: f32 = 65_536.0;
+        let high = (ns / HIGH) as i32;
+        i64::from(high) * 65_536 + i64::from((ns - high as f32 * HIGH) as i32)
+    }
 }
 
 #[cfg(test)]
@@ -583,6 +651,16 @@ mod tests {
         late.time_ns += 4000;
         binner.push(late);
         assert_eq!(binner.finish().unwrap().time_ns, 5_057_000);
+    }
+
+    #[test]
+    fn times_are_rounded_to_the_nearest_whatever_their_size() {
+        for ns in [0.0, 0.4, 0.6, 12_345.5, 9.9e8, 1e9, 1.5e12, 8.6e13] {
+            for ns in [ns, -ns] {
+                assert_eq!(rounded_ns(ns), libm::roundf(ns) as i64, "{ns}");
+            }
+        }
+        assert_eq!(rounded_ns(f32::NAN), 0);
     }
 
     #[test]
