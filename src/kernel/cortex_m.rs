@@ -24,10 +24,17 @@ pub(super) fn kept_u8(pixels: &[u8], row: &[i8]) -> LineSums {
     let n = pixels.len();
     let (p, h) = (pixels.as_ptr(), row.as_ptr());
     if n > KEPT_BLOCK || (p as usize | h as usize | n) % 4 != 0 || n != row.len() {
-        return kept_part_u8(pixels, row, 0);
+        return kept_anyhow_u8(pixels, row);
     }
     // SAFETY: both pointers lie at whole words and are good for n bytes, a multiple of four.
     apart(unsafe { whole(p, h, n) })
+}
+
+/// [`kept_u8`] of a line that lies anyhow; apart, or most lines would jump over it.
+#[cold]
+#[inline(never)]
+fn kept_anyhow_u8(pixels: &[u8], row: &[i8]) -> LineSums {
+    kept_part_u8(pixels, row, 0)
 }
 
 /// [`kept_u8`], and Σ h'·p with a second row that is kept: the pixels are loaded and added up once.

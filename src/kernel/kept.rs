@@ -147,9 +147,19 @@ impl Kernel {
     #[inline(always)]
     pub fn kept_u8(self, pixels: &[u8], row: &[i8]) -> LineSums {
         #[cfg(all(target_arch = "arm", any(target_feature = "dsp", rowtone_dsp)))]
-        if self.1 == Columns::Even {
-            return cortex_m::kept_u8(pixels, row);
-        }
+        return match self.1 {
+            Columns::Even => cortex_m::kept_u8(pixels, row),
+            Columns::All => self.kept_all_u8(pixels, row),
+        };
+        #[cfg(not(all(target_arch = "arm", any(target_feature = "dsp", rowtone_dsp))))]
+        self.kept_part_u8(pixels, row, 0)
+    }
+
+    /// [`Kernel::kept_u8`] with Σ p of all columns; apart, or lines with half of it would jump over it.
+    #[cfg(all(target_arch = "arm", any(target_feature = "dsp", rowtone_dsp)))]
+    #[cold]
+    #[inline(never)]
+    fn kept_all_u8(self, pixels: &[u8], row: &[i8]) -> LineSums {
         self.kept_part_u8(pixels, row, 0)
     }
 

@@ -31,6 +31,8 @@ pub struct LineSide<'a> {
     tally: Tally,
     ended: u32,
     tally_waits: bool,
+    /// The last reading took a tally along.
+    tally_given: bool,
     /// The last reading that [`LineSide::push`] gave.
     ready: Reading,
 }
@@ -54,6 +56,7 @@ impl<'a> LineSide<'a> {
             tally: Tally::NONE,
             ended: 0,
             tally_waits: false,
+            tally_given: false,
             ready: Reading {
                 sample: None,
                 tally: Tally::NONE,
@@ -73,16 +76,30 @@ impl<'a> LineSide<'a> {
     /// is moved but once, to where the caller wants it.)
     #[inline(always)]
     pub fn push(&mut self, line: &Line<'_>) -> Option<&Reading> {
-        self.note_line(line);
+        let complete = if self.tracker.expects(line) {
+            // Nothing else is to be done with it (`attend`).
+            let done = &mut self.ready.sample;
+            self.tracker
+                .push_expected_into(line, &mut self.binner, done)
+        } else {
+            self.note_line(line);
+            let done = &mut self.ready.sample;
+            self.tracker
+                .push_otherwise_into(line, None, &mut self.binner, done)
+        };
         // Most lines end here: nothing of a reading is written for them.
-        let done = &mut self.ready.sample;
-        if !self.tracker.push_into(line, &mut self.binner, done) {
+        if !complete {
             return None;
         }
-        (self.ready.tally, self.ready.frame) = match self.tally_waits {
-            true => self.take_tally(),
-            false => (Tally::NONE, line.frame),
-        };
+        if self.tally_waits {
+            (self.ready.tally, self.ready.frame) = self.take_tally();
+            self.tally_given = true;
+        } else {
+            if core::mem::take(&mut self.tally_given) {
+                self.ready.tally = Tally::NONE;
+            }
+            self.ready.frame = line.frame;
+        }
         Some(&self.ready)
     }
 
@@ -168,6 +185,7 @@ impl<'a> LineSide<'a> {
             // Another one in every frame, but not its first, which has enough to do.
             let others = u32::from(self.rows).saturating_sub(1).max(1);
             self.lit_row = (line.frame % others) as u16 + u16::from(self.rows > 1);
+            self.tracker.begin_frame(self.lit_row);
         }
         (self.frame, self.in_frame) = (line.frame, true);
         if line.row != self.lit_row {

@@ -173,10 +173,21 @@ impl Tracker<'_> {
         pixels: &R,
         times: bool,
     ) -> Result<Place, Sums> {
-        let is_fast = line.row < self.schedule.fast_path.until_row
-            && line.frame == self.schedule.fast_path.frame
-            && pixels.len() == usize::from(self.config.width);
-        if !is_fast {
+        if !self.schedule.fast_path.has(line) {
+            return Err(None);
+        }
+        self.take_expected(line, pixels, times)
+    }
+
+    /// [`Tracker::take_fast`] of a line that is expected to take the fast path.
+    #[inline(always)]
+    pub(super) fn take_expected<R: Summed>(
+        &mut self,
+        line: &Line<'_>,
+        pixels: &R,
+        times: bool,
+    ) -> Result<Place, Sums> {
+        if pixels.len() != self.store.width() {
             return Err(None);
         }
         let row = usize::from(line.row);
@@ -191,15 +202,16 @@ impl Tracker<'_> {
     /// What a line comes to where the picture has moved little; the light as it was with the line before is still there.
     #[inline(always)]
     fn measure_fast<R: Summed>(&self, row: usize, pixels: &R) -> Result<Measured, Sums> {
-        let (Some(table), Some(coefficients)) =
-            (self.store.table(row), self.store.coefficients(row))
-        else {
+        let Some(table) = self.store.table(row) else {
             return Err(None);
         };
-        if !table.has_texture() {
+        let Some(coefficients) = self.store.coefficients(row) else {
             return Err(None);
+        };
+        let (product, sum) = pixels.sums(self.store.recipe().kernel, coefficients);
+        if !table.has_texture() {
+            return Err(Some((product, sum)));
         }
-        let (product, sum) = pixels.sums(self.config.kernel, coefficients);
         let print = print::of_sums((product, sum));
         let to_reference = table.factor_to_reference(sum);
         let shift_px = table.shift_px(product * to_reference);
@@ -275,7 +287,7 @@ impl Tracker<'_> {
             self.work_in_background::<R::P>(row);
         }
         let place = self.accept(measured, times);
-        self.settle_fast_path(line.frame);
+        self.settle_fast_path(line);
         Ok(place)
     }
 
@@ -332,7 +344,7 @@ impl Tracker<'_> {
             }
             return Err(Rejected::Learning);
         }
-        self.settle_fast_path(line.frame);
+        self.settle_fast_path(line);
         let counts = &mut self.counts;
         let count = match found {
             Ok(_) => &mut counts.measured,
@@ -352,17 +364,17 @@ impl Tracker<'_> {
 
     /// Which lines will be on the fast path, after one that was not: none while there is a background job, while the
     /// motion is swift, and at the beginning of a frame.
-    fn settle_fast_path(&mut self, frame: u32) {
+    fn settle_fast_path(&mut self, line: &Line<'_>) {
         // Where lines are expected then stays between the shifts of those before, none of which is further than `near_px`.
         let near = self.prediction.predicted_px().abs() < self.correlator.here_px
             && self.light.to_reference <= UNLIT;
         let unhindered = !self.store.is_moving() && !self.check.is_searching();
         let at_rest = unhindered && self.prediction.is_at_rest() && self.light.is_settled() && near;
-        let rows = usize::from(self.config.rows);
+        let (frame, rows) = (line.frame, usize::from(self.config.rows));
         self.schedule.fast_path = FastPath {
             frame,
             until_row: if at_rest && !self.schedule.background {
-                self.schedule.next_check.min(rows) as u16
+                self.schedule.fast_until(line.row, rows)
             } else {
                 0
             },
@@ -440,7 +452,7 @@ impl Tracker<'_> {
             if self.stage == Stage::Rough && self.is_repeated(row, pixels, None) {
                 return Err(Rejected::Repeated);
             }
-            self.note_light(row, &table, pixels);
+            self.note_light(row, &table, pixels, sums);
             return Err(Rejected::NoTexture);
         }
         let information_per_px2 = table.information_per_px2();
@@ -582,7 +594,7 @@ impl Tracker<'_> {
     }
 
     /// A row without texture tells of the light too, where it is neither dark nor near to being clipped.
-    fn note_light<R: Row>(&mut self, row: usize, table: &RowTable, pixels: &R) {
+    fn note_light<R: Row>(&mut self, row: usize, table: &RowTable, pixels: &R, sums: Sums) {
         let columns = self.config.kernel.light_columns(self.config.width);
         let mean = table.pixel_sum() / f32::from(columns);
         let (dark, bright) = (
@@ -592,7 +604,7 @@ impl Tracker<'_> {
         if !(dark..bright).contains(&mean) {
             return;
         }
-        if let Some((_, sum)) = whole_sums(&self.store, row, pixels) {
+        if let Some((_, sum)) = sums.or_else(|| whole_sums(&self.store, row, pixels)) {
             let before = self.light.to_reference;
             self.light.to_reference = table.factor_to_reference(sum);
             self.light.add_since(before);

@@ -50,14 +50,13 @@ use crate::{
 };
 use blur::Blur;
 use check::Check;
-use correlate::Correlator;
+use correlate::{Correlator, Sums};
 use light::Light;
 use line::{Place, Rejected};
 use planar::Planar;
 use predict::Prediction;
 use print::Copies;
-use row::Row;
-use schedule::Schedule;
+use schedule::{FastRows, Schedule};
 use vetting::Vetting;
 
 /// Where the shifts of rows go, and where the group before them goes when it is complete.
@@ -94,19 +93,26 @@ pub enum Stage {
 }
 
 /// See the [module](self).
+// In this order in memory: a microcontroller reaches what every line needs, which is first, without a sum.
+#[repr(C)]
 #[derive(Debug)]
 pub struct Tracker<'a> {
-    config: Config,
+    prediction: Prediction,
+    light: Light,
+    correlator: Correlator,
+    counts: Counts,
+    schedule: Schedule,
+    /// See [`Tracker::curvature`]; where lines are not unsmeared one by one.
+    curvature: Curvature,
+    planar: Planar,
     store: Store<'a>,
+    config: Config,
     /// Where a line of scattered pixels is brought together.
     room: &'a mut [u8],
     stage: Stage,
     frame: Option<u32>,
     frames_in_stage: u16,
-    prediction: Prediction,
-    light: Light,
     blur: Blur,
-    planar: Planar,
     #[cfg(feature = "long-exposure")]
     paths: path::Paths,
     meter: NoiseMeter,
@@ -115,11 +121,6 @@ pub struct Tracker<'a> {
     /// Largest shift of the round before, px; beyond reach in the first round.
     range_px: f32,
     check: Check,
-    correlator: Correlator,
-    schedule: Schedule,
-    /// See [`Tracker::curvature`]; where lines are not unsmeared one by one.
-    curvature: Curvature,
-    counts: Counts,
 }
 
 impl<'a> Tracker<'a> {
@@ -236,19 +237,76 @@ impl<'a> Tracker<'a> {
         }
     }
 
-    /// Takes one line and passes what it measures on to `binner`. Says whether the group of rows before it is complete, which
-    /// is in `done` then. As [`Tracker::push`] and [`Binner::push`] one after the other, in fewer instructions.
+    /// A frame has begun, in which this row does not take the fast path (0 for none).
+    pub(crate) fn begin_frame(&mut self, pause_row: u16) {
+        self.schedule.pause_row = pause_row;
+        self.schedule.fast_path.end();
+        self.planar.fast = FastRows::default();
+    }
+
+    /// The line is expected to take the fast path: its frame has begun, and its row is not that of
+    /// [`Tracker::begin_frame`].
     #[inline(always)]
-    pub fn push_into(
+    pub(crate) fn expects(&self, line: &Line<'_>) -> bool {
+        self.schedule.fast_path.has(line)
+    }
+
+    /// Takes one line that it [expects](Tracker::expects) and passes what it measures on to `binner`. Says whether the group of
+    /// rows before it is complete, which is in `done` then. As [`Tracker::push`] and [`Binner::push`] one after the
+    /// other, in fewer instructions.
+    // Not inlined and not generic: compiled here, as this crate is. The pixels are taken from the line again where it turns
+    // out to be unlike what was expected, or they would be kept for that.
+    #[inline(never)]
+    pub(crate) fn push_expected_into(
         &mut self,
         line: &Line<'_>,
         binner: &mut Binner,
         done: &mut Option<Sample>,
     ) -> bool {
+        let Pixels::U8(pixels) = line.pixels else {
+            return self.push_expected_wide_into(line, binner, done);
+        };
+        match self.take_expected(line, &pixels, false) {
+            // At rest, so not swift.
+            Ok(place) => self.pass_on(line, place, self.curvature, (binner, done)),
+            Err(sums) => self.push_otherwise_into(line, sums, binner, done),
+        }
+    }
+
+    /// [`Tracker::push_expected_into`] of other pixels than bytes.
+    #[inline(never)]
+    fn push_expected_wide_into(
+        &mut self,
+        line: &Line<'_>,
+        binner: &mut Binner,
+        done: &mut Option<Sample>,
+    ) -> bool {
+        let taken = match line.pixels {
+            Pixels::U8(p) => self.take_expected(line, &p, false),
+            Pixels::U16(p) => self.take_expected(line, &p, false),
+            Pixels::Upper(ref p) => self.take_expected(line, p, false),
+        };
+        match taken {
+            Ok(place) => self.pass_on(line, place, self.curvature, (binner, done)),
+            Err(sums) => self.push_otherwise_into(line, sums, binner, done),
+        }
+    }
+
+    /// [`Tracker::push_expected_into`] of a line that was not expected, or that turned out to be unlike that; `sums`: what is
+    /// known of it.
+    #[inline(never)]
+    pub(crate) fn push_otherwise_into(
+        &mut self,
+        line: &Line<'_>,
+        sums: Sums,
+        binner: &mut Binner,
+        done: &mut Option<Sample>,
+    ) -> bool {
+        let to = (binner, done);
         match line.pixels {
-            Pixels::U8(p) => self.push_u8_into(line, p, (binner, done)),
-            Pixels::U16(p) => self.push_u16_into(line, p, (binner, done)),
-            Pixels::Upper(ref p) => self.push_upper_into(line, p, (binner, done)),
+            Pixels::U8(p) => self.take_otherwise_into(line, p, sums, to),
+            Pixels::U16(p) => self.take_otherwise_into(line, p, sums, to),
+            Pixels::Upper(ref p) => self.take_scattered_otherwise_into(line, p, sums, to),
         }
     }
 
@@ -266,37 +324,9 @@ impl<'a> Tracker<'a> {
     }
 
     #[inline(never)]
-    fn push_u8_into(&mut self, line: &Line<'_>, p: &[u8], to: Bins<'_>) -> bool {
-        self.take_into(line, p, to)
-    }
-
-    #[inline(never)]
-    fn push_u16_into(&mut self, line: &Line<'_>, p: &[u16], to: Bins<'_>) -> bool {
-        self.take_into(line, p, to)
-    }
-
-    #[inline(never)]
     fn push_upper(&mut self, line: &Line<'_>, pixels: &UpperBytes<'_>) -> Outcome {
         let place = self.take_scattered(line, pixels);
         self.outcome(line, place)
-    }
-
-    #[inline(never)]
-    fn push_upper_into(&mut self, line: &Line<'_>, pixels: &UpperBytes<'_>, to: Bins<'_>) -> bool {
-        match self.take_fast(line, pixels, false) {
-            // At rest, so not swift.
-            Ok(place) => self.pass_on(line, place, self.curvature, to),
-            Err(sums) => self.take_scattered_otherwise_into(line, pixels, sums, to),
-        }
-    }
-
-    #[inline(always)]
-    fn take_into<R: Row>(&mut self, line: &Line<'_>, pixels: R, to: Bins<'_>) -> bool {
-        match self.take_fast(line, &pixels, false) {
-            // At rest, so not swift.
-            Ok(place) => self.pass_on(line, place, self.curvature, to),
-            Err(sums) => self.take_otherwise_into(line, pixels, sums, to),
-        }
     }
 
     #[inline(always)]

@@ -12,6 +12,12 @@ pub(super) struct FastPath {
 }
 
 impl FastPath {
+    /// The line takes it.
+    #[inline(always)]
+    pub(super) fn has(&self, line: &Line<'_>) -> bool {
+        line.row < self.until_row && line.frame == self.frame
+    }
+
     /// No line takes it.
     pub(super) fn end(&mut self) {
         self.until_row = 0;
@@ -43,6 +49,9 @@ pub(super) struct Schedule {
     pub(super) background: bool,
     /// The row from which on the next line is checked.
     pub(super) next_check: usize,
+    /// A row of this frame that does not take the fast path, so that whoever pushes lines has something to do with it;
+    /// 0 for none.
+    pub(super) pause_row: u16,
 }
 
 impl Schedule {
@@ -52,6 +61,16 @@ impl Schedule {
             turn: usize::MAX,
             background: false,
             next_check: 0,
+            pause_row: 0,
+        }
+    }
+
+    /// The row before which the fast path ends, of a picture of so many rows, after a line of row `after`.
+    pub(super) fn fast_until(&self, after: u16, rows: usize) -> u16 {
+        let until = self.next_check.min(rows) as u16;
+        match self.pause_row > after {
+            true => until.min(self.pause_row),
+            false => until,
         }
     }
 }
