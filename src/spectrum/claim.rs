@@ -4,6 +4,7 @@ use super::fit::{Fit, Model};
 use super::model::Samples;
 use super::search::Search;
 use super::standing::{A_NUMBER, AS_IMAGE, STEPS, numbers, stands};
+use super::tone::Tone;
 
 /// A shape is tried in earnest where it explains this share of what two tones do.
 const NEARLY: f32 = 0.98;
@@ -22,8 +23,9 @@ impl Search {
         let larger = older.iter().position(|t| {
             t.shape.power() > power && self.is_image(samples, newest.frequency, t.frequency)
         });
-        let Some(i) = larger else { return };
-        if self.is_shape(samples, fit, model, i) {
+        let Some(image) = larger else { return };
+        let i = self.largest_of_images(samples, model, image);
+        if i == image && self.is_shape(samples, fit, model, i) {
             let variance = model.squares / Fit::freedom(samples, model).max(1.0);
             let Some(mut without) = samples.copy_of(model) else {
                 return;
@@ -41,6 +43,21 @@ impl Search {
         if self.is_misfit(samples, fit, model, i, true) {
             self.give_notch(samples, fit, model, i);
         }
+    }
+
+    /// The largest of tone `i` and those at whose images it is: what is left there is that one's.
+    fn largest_of_images(&self, samples: &Samples<'_>, model: &Model, i: usize) -> usize {
+        let (mut largest, mut at) = (i, model.tones.get(i).copied());
+        for (j, t) in model.tones.iter().enumerate() {
+            let larger = |own: Tone| {
+                t.shape.power() > own.shape.power()
+                    && self.is_image(samples, t.frequency, own.frequency)
+            };
+            if at.is_some_and(larger) {
+                (largest, at) = (j, Some(*t));
+            }
+        }
+        largest
     }
 
     /// A shape of tone `i` may explain what the newest one does too.
@@ -86,7 +103,8 @@ impl Search {
             let imaged = model.tones.iter().any(|t| {
                 t.shape.power() < power && self.is_image(samples, t.frequency, tone.frequency)
             });
-            if tone.notched || !imaged || self.tired(fit) {
+            let is_largest = self.largest_of_images(samples, model, i) == i;
+            if tone.notched || !imaged || !is_largest || self.tired(fit) {
                 continue;
             }
             if self.is_misfit(samples, fit, model, i, false) {
