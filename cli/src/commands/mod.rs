@@ -154,13 +154,33 @@ fn answer(error: &clap::Error) -> ExitCode {
         let _ = error.print();
         return ExitCode::SUCCESS;
     }
-    let text = error.to_string();
-    // clap's message, then its usage and hint paragraphs: keep what it says and how to go on.
-    let what = text.split("\n\nUsage:").next().unwrap_or(&text);
+    report(&Failure::usage(one_line(&error.to_string())))
+}
+
+/// clap's message without its usage paragraph: what it says, its tips, and how to go on.
+fn one_line(text: &str) -> String {
+    let what = text.split("\n\nUsage:").next().unwrap_or(text);
     let what = what.strip_prefix("error: ").unwrap_or(what);
     let what = what
         .split("\n\nFor more information")
         .next()
         .unwrap_or(what);
-    report(&Failure::usage(format!("{what}; try --help")))
+    let mut parts: Vec<&str> = what.split("tip: ").map(str::trim).collect();
+    parts.push("try --help");
+    parts.join("; ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::one_line;
+
+    #[test]
+    fn a_tip_of_the_parser_is_told_apart_from_what_it_is_about() {
+        let text = "error: unrecognized subcommand 'analyse'\n\n  tip: a similar subcommand exists: \
+                    'analyze'\n\nUsage: rowtone [COMMAND]\n\nFor more information, try '--help'.\n";
+        assert_eq!(
+            one_line(text),
+            "unrecognized subcommand 'analyse'; a similar subcommand exists: 'analyze'; try --help"
+        );
+    }
 }
