@@ -52,6 +52,8 @@ pub struct Pulses {
     pub spectrum: Pulse,
     /// Waits for signals.
     pub signals: Pulse,
+    /// Takes the page's connections.
+    pub page: Pulse,
 }
 
 impl Pulses {
@@ -61,6 +63,7 @@ impl Pulses {
             ("output", &self.output),
             ("spectrum", &self.spectrum),
             ("signals", &self.signals),
+            ("page", &self.page),
         ];
         let now_ms = ms(began);
         let late = threads

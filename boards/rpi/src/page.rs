@@ -142,5 +142,7 @@ pub fn serve(config: &Config, shared: &Arc<Shared>) -> io::Result<Option<Server>
     });
     let names = Names::of_this_machine(config.page.names.iter().cloned());
     let site = Site::new(Arc::clone(live), desk, Access::Password(keeper), names);
-    Server::start(listen, Arc::new(site)).map(Some)
+    let watched = Arc::clone(shared);
+    let alive = move || watched.pulses.page.beat(watched.started);
+    Server::start_watched(listen, Arc::new(site), alive).map(Some)
 }

@@ -26,6 +26,8 @@ const MAX_CLIPS: usize = 1;
 const MAX_LISTS: usize = 4;
 /// Requests on one connection.
 const MAX_REQUESTS: usize = 1000;
+/// How often the thread that takes connections gives a sign of life.
+const WAKE: Duration = Duration::from_millis(500);
 /// A connection's thread needs little.
 const STACK: usize = 256 << 10;
 
@@ -82,13 +84,27 @@ impl Server {
     /// # Errors
     /// What the system says where nobody can listen there.
     pub fn start(address: SocketAddr, site: Arc<Site>) -> io::Result<Self> {
+        Self::start_watched(address, site, || {})
+    }
+
+    /// As [`start`](Self::start); the thread that takes connections calls `alive` at least every
+    /// half second, where the system can wake it (Linux).
+    ///
+    /// # Errors
+    /// What the system says where nobody can listen there.
+    pub fn start_watched(
+        address: SocketAddr,
+        site: Arc<Site>,
+        alive: impl Fn() + Send + 'static,
+    ) -> io::Result<Self> {
         let listener = TcpListener::bind(address)?;
+        wake(&listener)?;
         let address = listener.local_addr()?;
         let stop = Arc::new(AtomicBool::new(false));
         let stopping = Arc::clone(&stop);
         let thread = std::thread::Builder::new()
             .name("page".to_owned())
-            .spawn(move || accept(&listener, &site, &stopping))?;
+            .spawn(move || accept(&listener, &site, &stopping, &alive))?;
         Ok(Self {
             address,
             stop,
@@ -119,15 +135,33 @@ impl Drop for Server {
     }
 }
 
-fn accept(listener: &TcpListener, site: &Arc<Site>, stop: &AtomicBool) {
+/// Lets `accept` come back now and then although nobody connects.
+#[cfg(target_os = "linux")]
+fn wake(listener: &TcpListener) -> io::Result<()> {
+    use nix::sys::socket::{setsockopt, sockopt::ReceiveTimeout};
+    use nix::sys::time::{TimeVal, TimeValLike};
+    use std::os::fd::AsRawFd;
+
+    let every = TimeVal::milliseconds(WAKE.as_millis() as i64);
+    Ok(setsockopt(listener.as_raw_fd(), ReceiveTimeout, &every)?)
+}
+
+#[cfg(not(target_os = "linux"))]
+fn wake(_listener: &TcpListener) -> io::Result<()> {
+    Ok(())
+}
+
+fn accept(listener: &TcpListener, site: &Arc<Site>, stop: &AtomicBool, alive: &dyn Fn()) {
     let full = full();
     let counts = Arc::new(Counts::default());
     for stream in listener.incoming() {
         if stop.load(Ordering::Acquire) {
             return;
         }
+        alive();
         let stream = match stream {
             Ok(stream) => stream,
+            Err(error) if error.kind() == io::ErrorKind::WouldBlock => continue,
             Err(_) => {
                 // Out of descriptors, mostly: the next one may have more luck.
                 std::thread::sleep(Duration::from_millis(50));

@@ -51,6 +51,23 @@ fn start(access: Access) -> (Server, Arc<Live>) {
     (server, live)
 }
 
+#[cfg(target_os = "linux")]
+#[test]
+fn it_gives_signs_of_life_though_nobody_connects() {
+    let live = Arc::new(Live::default());
+    let desk = Arc::new(Desk::default());
+    let site = Site::new(live, desk, Access::Open, Names::default());
+    let (tell, told) = std::sync::mpsc::channel();
+    let alive = move || {
+        let _ = tell.send(());
+    };
+    let _server = Server::start_watched(([127, 0, 0, 1], 0).into(), Arc::new(site), alive).unwrap();
+    for _ in 0..2 {
+        told.recv_timeout(Duration::from_secs(10))
+            .expect("a sign of life");
+    }
+}
+
 /// Sends bytes, and returns all that comes until the other end closes.
 fn talk(to: SocketAddr, bytes: &[u8]) -> String {
     let mut stream = TcpStream::connect(to).expect("it listens");
