@@ -4,6 +4,9 @@
 mod decode;
 #[path = "../examples/peaks.rs"]
 mod peaks;
+#[path = "../examples/shapes.rs"]
+#[allow(dead_code)]
+mod shapes;
 #[path = "../examples/two_threads.rs"]
 mod two_threads;
 
@@ -65,5 +68,21 @@ fn both_wires_are_decoded() {
         assert_eq!(heard.len(), 1);
         assert_eq!(heard[0], message);
         assert_eq!(decode::line(&heard[0]), "session 3, report 7:");
+    }
+}
+
+#[test]
+fn both_edges_of_a_bending_part_move_as_simulated() {
+    let edges = shapes::edges().expect("a good configuration");
+    for edge in edges {
+        for (found, (hz, px)) in edge.into_iter().zip(shapes::TONES) {
+            // The middle of the outermost tiles is 7.5 of 63.5 rows from the edge. A tile tells of
+            // where its texture is, within some rows of that.
+            let truth = px * (1.0 - 7.5 / 63.5);
+            assert!(
+                (found / truth - 1.0).abs() < 0.07,
+                "{hz} Hz: {found}, {truth}"
+            );
+        }
     }
 }

@@ -12,6 +12,7 @@ use rowtone::link::Link;
 use rowtone::link::settings::store::Nowhere;
 use rowtone::pipeline::{Collector, Pipeline, Reporter};
 use rowtone::report::Report;
+use rowtone::shape::{Grid, SumsStorage, Texture, TextureStorage, TileSums, TileTexture, ToneSums};
 use rowtone::spectrum;
 use rowtone::timeline::Group;
 use rowtone::tracker::{self, Config, Outcome};
@@ -99,6 +100,8 @@ fn line_of(frame: u32, row: usize, line: &mut [u8; WIDTH]) -> i64 {
 fn nothing_is_allocated_from_lines_to_bytes() {
     // What the allocator counts at all.
     assert!(calls_of(|| drop(vec![1u8; 10])).0 >= 2);
+
+    assert_eq!(shapes_of_tiles(), (0, 40 * ROWS as u32));
 
     let mut picture = tracker::StaticStorage::<{ WIDTH * ROWS }, ROWS, WIDTH>::new();
     let mut spectrum = spectrum::StaticStorage::<2048, 64, 16, 1024, 5>::new();
@@ -246,4 +249,54 @@ fn there_and_back(report: &Report) -> usize {
     let heard = heard + frame.iter().filter_map(|&b| decoder.push(b)).count();
     assert_eq!(heard, 2);
     line.len() + frame.len()
+}
+
+/// The stage that sums shapes over the picture, in memory that was lent: calls of the allocator, and lines summed.
+fn shapes_of_tiles() -> (u64, u32) {
+    const TILES: usize = WIDTH / 16;
+    let timing = Timing::new(1_000_000_000, 100_000, ROWS as u16).unwrap();
+    let grid = Grid::new(WIDTH as u16, ROWS as u16, 16).unwrap();
+    let mut mean = [0.0; WIDTH * ROWS];
+    let mut pixels = [0u8; WIDTH];
+    for (row, mean) in mean.chunks_exact_mut(WIDTH).enumerate() {
+        paint(&mut pixels, row, 0.0, 0);
+        mean.iter_mut()
+            .zip(pixels)
+            .for_each(|(mean, p)| *mean = p.into());
+    }
+    let (mut right, mut down) = ([0; WIDTH * ROWS], [0; WIDTH * ROWS]);
+    let (mut rest, mut brightness) = ([[0.0; 2]; TILES * ROWS], [0.0; ROWS]);
+    let mut tiles = [TileTexture::default(); TILES];
+    let (mut sums, mut products) = ([ToneSums::default(); 2 * TILES], [[0.0; 2]; TILES]);
+    calls_of(|| {
+        let storage = TextureStorage {
+            right: &mut right,
+            down: &mut down,
+            rest: &mut rest,
+            brightness: &mut brightness,
+            tiles: &mut tiles,
+        };
+        let texture = Texture::build(grid, &mean, 0.0, storage).unwrap();
+        let storage = SumsStorage {
+            sums: &mut sums,
+            products: &mut products,
+        };
+        let mut sums = TileSums::new(&texture, timing, &[17.0, 131.7], 0, storage).unwrap();
+        for frame in 0..40 {
+            for row in 0..ROWS {
+                let start_ns = line_of(frame, row, &mut pixels);
+                let line = Line {
+                    frame,
+                    row: row as u16,
+                    start_ns,
+                    pixels: Pixels::U8(&pixels),
+                };
+                sums.push(&line, 1.0);
+            }
+        }
+        // These waves all lean one way, so that a tile alone tells no axis: its sums are there.
+        assert!(sums.sums().iter().all(|sum| sum.x[0] != 0.0));
+        let _ = sums.single(0, 1, 40);
+        sums.lines()
+    })
 }

@@ -171,6 +171,20 @@ def main():
             wide = browser.value("document.documentElement.scrollWidth")
             check("nothing sticks out at 1280 px", wide <= 1280, wide)
 
+            # The shapes: all of this picture moves alike.
+            browser.value("document.getElementById('shapes-show').click()")
+            browser.wait("chosenShape()?.largest > 0", "the shapes", 60)
+            hz, moving, known, largest = browser.value("(() => { const { shape, largest } = chosenShape(); return [shape.hz, shape.moves.filter(Boolean).length, shape.x.filter((x) => x).length, largest]; })()")
+            check("the strongest tone's shape is shown", abs(hz - TONES[0][0]) < 0.2 and moving >= 0.9 * known and abs(largest - 0.3) < 0.05, hz, moving, known, largest)
+            time.sleep(0.3)
+            colours = browser.value(f"({drawn})('shapes')")
+            check("shapes are drawn", colours > 10, colours)
+            if args.shots:
+                browser.value("document.getElementById('shapes-card').scrollIntoView()")
+                browser.shot(f"{args.shots}/page-shapes.png")
+                browser.value("scrollTo(0, 0)")
+            browser.value("document.getElementById('shapes-show').click()")
+
             # A part that is dragged is measured.
             box = browser.value("(() => { const b = document.getElementById('picture').getBoundingClientRect(), s = pictureScale().scale; return [b.left, b.top, s]; })()")
             at = lambda x, y: [box[0] + x * box[2], box[1] + y * box[2]]

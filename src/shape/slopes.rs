@@ -32,6 +32,23 @@ pub(super) fn noise_gain() -> f32 {
     2.0 * both.map(|(a, b)| a * b).sum::<f32>()
 }
 
+/// What that noise adds to −Σ h·∂³r: the smooth filter's inner product with second differences of the accurate one.
+pub(super) fn bend_noise_gain() -> f32 {
+    let smooth = |k: i32| signed(SMOOTH_SLOPE.as_slice(), k);
+    let accurate = |k: i32| signed(ACCURATE_SLOPE.as_slice(), k);
+    let reach = SMOOTH_SLOPE.len() as i32;
+    let taps = (-reach..=reach)
+        .map(|k| smooth(k) * (2.0 * accurate(k) - accurate(k - 1) - accurate(k + 1)));
+    taps.sum()
+}
+
+/// Tap `k` of the antisymmetric filter that has this right half.
+fn signed(half: &[f32], k: i32) -> f32 {
+    let at = (k.unsigned_abs() as usize).checked_sub(1);
+    let tap = at.and_then(|at| half.get(at)).copied().unwrap_or(0.0);
+    if k < 0 { -tap } else { tap }
+}
+
 /// A mean picture, grey values, row by row.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Mean<'a> {
@@ -69,6 +86,23 @@ impl Mean<'_> {
                 self.along(at, self.width, accurate_y),
             ],
         })
+    }
+
+    /// Third derivatives along x and along y at column `x` of row `y`, as second differences of the accurate slopes; 0 too
+    /// near the picture's edge.
+    pub(super) fn bend(&self, x: usize, y: usize) -> [f32; 2] {
+        let at =
+            |x: Option<usize>, y: Option<usize>, axis: usize| Some(self.at(x?, y?)?.accurate[axis]);
+        let second = |before: Option<f32>, here: Option<f32>, behind: Option<f32>| {
+            Some(before? - 2.0 * here? + behind?)
+        };
+        let (here_x, here_y) = (at(Some(x), Some(y), 0), at(Some(x), Some(y), 1));
+        let left = at(x.checked_sub(1), Some(y), 0);
+        let above = at(Some(x), y.checked_sub(1), 1);
+        [
+            second(left, here_x, at(Some(x + 1), Some(y), 0)).unwrap_or(0.0),
+            second(above, here_y, at(Some(x), Some(y + 1), 1)).unwrap_or(0.0),
+        ]
     }
 
     /// An antisymmetric filter's right half, `stride` values from one tap to the next.

@@ -3,7 +3,7 @@
 use core::fmt;
 
 use super::Grid;
-use super::slopes::{MARGIN, Mean, noise_gain};
+use super::slopes::{MARGIN, Mean, bend_noise_gain, noise_gain};
 use crate::camera::Pixels;
 use crate::kernel::MAX_COEFFICIENT;
 
@@ -16,9 +16,13 @@ pub struct TileTexture {
     pub response: [[f32; 2]; 2],
     /// Covariance of the two scores of one frame where a pixel's variance is 1 grey value squared: xx, xy, yy.
     pub noise: [f32; 3],
-    /// Where the texture is that tells of x, and the one that tells of y: to the right and downwards of the tile's middle, px.
-    /// Of a motion that varies over the tile, that is the place whose motion is told.
-    pub place: [[f32; 2]; 2],
+    /// First moments of M about the tile's middle, (grey values)²/px: `moments[i][j]` is what one px of motion along axis j,
+    /// a px to the right and a px below the middle, adds to the score along axis i. A motion d that varies over the tile
+    /// by its slopes leaves M·d and, for each direction, its moments times the slope of d.
+    pub moments: [[[f32; 2]; 2]; 2],
+    /// −Σ h·∂³r along the same axis, x and y, grey values squared: over M's diagonal it is the mean square of the texture's
+    /// angular wave numbers, (rad/px)², by which a large motion blurs the mean picture.
+    pub bend: [f32; 2],
 }
 
 /// Memory of a [`Texture`], lent by the caller: 2 bytes a pixel and 8 a row of a tile.
@@ -245,21 +249,20 @@ impl Sums {
                 own = add(own, q.map(|q| f32::from(q) * slopes.grey));
                 let h = [0, 1].map(|axis| f32::from(q[axis]) * unit[axis]);
                 tile.add(h, slopes.accurate, place.beside_middle(x, y));
+                for (sum, (h, bend)) in tile.bend.iter_mut().zip(h.into_iter().zip(mean.bend(x, y)))
+                {
+                    *sum -= h * bend;
+                }
             }
             if let Some(rest) = rest.get_mut(y * place.columns + place.column) {
                 *rest = own;
             }
         }
-        let middle = 0.5 * (place.side as f32 - 1.0);
         let noise = noise_gain() * self.count * variance;
         for axis in [0, 1] {
             let own = &mut tile.response[axis][axis];
-            let whole = *own;
-            tile.place[axis] = tile.place[axis].map(|sum| {
-                let mean = if whole > 0.0 { sum / whole } else { 0.0 };
-                mean.clamp(-middle, middle)
-            });
-            *own = (whole - noise).max(0.0);
+            *own = (*own - noise).max(0.0);
+            tile.bend[axis] -= bend_noise_gain() * self.count * variance;
         }
         tile
     }
@@ -268,8 +271,10 @@ impl Sums {
 impl TileTexture {
     /// A pixel's share; `away` is where it is against the tile's middle, px.
     fn add(&mut self, h: [f32; 2], slopes: [f32; 2], away: [f32; 2]) {
-        for (place, (h, slope)) in self.place.iter_mut().zip(h.into_iter().zip(slopes)) {
-            *place = add(*place, away.map(|away| away * h * slope));
+        for (row, h) in self.moments.iter_mut().zip(h) {
+            for (moment, slope) in row.iter_mut().zip(slopes) {
+                *moment = add(*moment, away.map(|away| away * h * slope));
+            }
         }
         for (row, h) in self.response.iter_mut().zip(h) {
             *row = add(*row, slopes.map(|s| h * s));

@@ -2,7 +2,7 @@
 //!
 //! - [`live`]: what is shown; whoever measures hands it over ([`reports`], [`frames`], [`motion`]) and never waits;
 //! - [`control`]: what can be changed, by whom ([`password`]);
-//! - [`site`]: which address gives what ([`picture`], [`advice`], [`clip`], [`csv`], [`metrics`], [`state`]);
+//! - [`site`]: which address gives what ([`picture`], `shapes`, [`advice`], [`clip`], [`csv`], [`metrics`], [`state`]);
 //! - [`still`]: the page as one file to hand on;
 //! - [`server`]: connections, requests and answers ([`http`]), and who is let in ([`guard`]).
 //!
@@ -32,6 +32,7 @@ pub mod password;
 pub mod picture;
 pub mod reports;
 pub mod server;
+mod shapes;
 pub mod site;
 pub mod state;
 pub mod still;

@@ -14,7 +14,7 @@ use crate::http::request::{Head, Method};
 use crate::live::Live;
 use crate::picture::{Aim, Grey};
 use crate::reports::Entry;
-use crate::{clip, csv, metrics, state};
+use crate::{clip, csv, metrics, shapes, state};
 
 /// The page, all of it: one file that needs nothing else.
 pub const PAGE: &str = concat!(
@@ -24,6 +24,7 @@ pub const PAGE: &str = concat!(
     include_str!("../web/numbers.js"),
     include_str!("../web/charts.js"),
     include_str!("../web/picture.js"),
+    include_str!("../web/shapes.js"),
     include_str!("../web/settings.js"),
     include_str!("../web/main.js"),
     include_str!("../web/tail.html"),
@@ -53,6 +54,7 @@ pub struct Site {
     requests: Rates,
     guesses: Rates,
     picture: Mutex<Option<Shown>>,
+    shapes: shapes::Latest,
     refused: AtomicU64,
 }
 
@@ -76,6 +78,7 @@ impl Site {
             requests: Rates::new(REQUESTS),
             guesses: Rates::new(GUESSES),
             picture: Mutex::new(None),
+            shapes: shapes::Latest::default(),
             refused: AtomicU64::new(0),
         }
     }
@@ -139,6 +142,10 @@ impl Site {
                     "there is no picture yet, or none at all over a serial line",
                 )
                 .with("Retry-After: 1"),
+            },
+            "/api/shapes" => match self.shapes.get(&self.live) {
+                Ok(text) => Reply::json(text.to_string()),
+                Err(why) => Reply::refusal(503, why).with("Retry-After: 2"),
             },
             "/api/settings" => Reply::json(self.settings().to_string()),
             "/api/clip.y4m" => self.clip(),

@@ -252,6 +252,7 @@ if (STILL) still();
 else {
   listenToPicture();
   listenToSettings();
+  listenToShapes();
   refresh().then(() => { follow(); picture(); motion(); });
   setInterval(motion, 700);
   setInterval(soon, 1000);

@@ -14,6 +14,7 @@ use rowtone::shape::{TileTexture, ToneSums};
 use rowtone_linear::Symmetric;
 
 use super::blocks::Block;
+use super::correct::{centred, unblurred};
 use super::error::{RecordingError, ShapesError};
 use super::pass::TileBlocks;
 use super::tones::{Tones, exposure_gain};
@@ -360,8 +361,9 @@ pub(super) fn is_far(sums: &TileBlocks, tones: &Tones) -> bool {
 
 /// What is known of a tile's motion along both axes at one tone.
 #[derive(Clone, Copy, Debug, Default)]
-struct Estimate {
-    px: [Complex64; 2],
+pub(super) struct Estimate {
+    /// X along x and Y along y, px.
+    pub(super) px: [Complex64; 2],
     /// Covariance of a real or imaginary part, px²: xx, xy, yy.
     covariance: [f64; 3],
     /// Degrees of freedom of the noise it was measured by.
@@ -417,6 +419,9 @@ pub(super) fn shapes(
         }
     }
     for all in &mut all {
+        for (estimate, texture) in all.iter_mut().zip(&sums.tiles) {
+            estimate.px = unblurred(texture, estimate.px);
+        }
         centred(sums, all);
     }
     if let Some(background) = &camera.background {
@@ -483,7 +488,7 @@ fn noise(
 }
 
 /// From scores to shifts.
-struct Inverse {
+pub(super) struct Inverse {
     inverse: [[f64; 2]; 2],
     /// Of the shifts, where a pixel's variance is one: xx, xy, yy.
     covariance: [f64; 3],
@@ -491,7 +496,7 @@ struct Inverse {
 
 impl Inverse {
     /// What a direction knows nothing of gets a variance beyond all use instead of none.
-    fn of(texture: &TileTexture) -> Self {
+    pub(super) fn of(texture: &TileTexture) -> Self {
         let [[a, b], [c, d]] = texture.response.map(|row| row.map(f64::from));
         let least = (1e-6 * (a + d)).max(1e-9);
         let (a, d) = (a + least, d + least);
@@ -513,52 +518,8 @@ impl Inverse {
         }
     }
 
-    fn solve(&self, scores: [Complex64; 2]) -> [Complex64; 2] {
+    pub(super) fn solve(&self, scores: [Complex64; 2]) -> [Complex64; 2] {
         self.inverse.map(|[x, y]| scores[0] * x + scores[1] * y)
-    }
-}
-
-/// Moves each tile's amplitude from where its texture is to the tile's middle, along the slope of the shape: of the
-/// differences to its neighbours the smaller, and none where they disagree, so that an edge of a part stays one.
-fn centred(sums: &TileBlocks, all: &mut [Estimate]) {
-    let (columns, rows) = (sums.grid.columns(), sums.grid.rows());
-    let px: Vec<[Complex64; 2]> = all.iter().map(|estimate| estimate.px).collect();
-    let side = sums.grid.tile_px() as f64;
-    for (tile, estimate) in all.iter_mut().enumerate() {
-        let place = sums.tiles[tile].place;
-        for axis in [0, 1] {
-            let lines = [
-                (1, tile % columns, columns),
-                (columns, tile / columns, rows),
-            ];
-            for (along, (stride, at, count)) in lines.into_iter().enumerate() {
-                let value = |to: usize| px[tile + to * stride - at * stride][axis];
-                let step = |from: usize| value(from + 1) - value(from);
-                // At the picture's edge the two steps behind each other.
-                let steps = match at {
-                    _ if count < 3 => continue,
-                    0 => [step(0), step(1)],
-                    _ if at + 1 == count => [step(at - 1), step(at - 2)],
-                    _ => [step(at - 1), step(at)],
-                };
-                let slope = Complex64::new(
-                    smaller(steps[0].re, steps[1].re),
-                    smaller(steps[0].im, steps[1].im),
-                );
-                estimate.px[axis] -= slope * (f64::from(place[axis][along]) / side);
-            }
-        }
-    }
-}
-
-/// Of two steps the smaller; 0 where they go opposite ways.
-fn smaller(a: f64, b: f64) -> f64 {
-    if a * b <= 0.0 {
-        0.0
-    } else if a.abs() < b.abs() {
-        a
-    } else {
-        b
     }
 }
 

@@ -6,6 +6,7 @@
 //! in each tile; the blocks tell the frequencies better than a window does, and the noise beside each tone (`fit`).
 
 mod blocks;
+mod correct;
 mod error;
 mod fit;
 mod mean;
@@ -17,13 +18,14 @@ use std::sync::atomic::AtomicBool;
 
 use num_complex::Complex64;
 use rowtone::shape::Grid;
+use serde::Serialize;
 
 use rowtone_clip::{CameraOptions, Feed, Rect};
 
 pub use self::error::{Alike, Hidden, RecordingError, ShapesError};
 
 use self::mean::Mean;
-use self::tones::Tones;
+use self::tones::{Findings, Found, Tones};
 
 /// What is wanted of a recording.
 #[derive(Clone, Debug, PartialEq)]
@@ -36,6 +38,8 @@ pub struct Wanted {
     pub window_s: f64,
     /// Most tones where none are given.
     pub most: usize,
+    /// The tones that are there, the largest first, where they are known already: they are not looked for then.
+    pub known: Option<Vec<Found>>,
 }
 
 impl Default for Wanted {
@@ -45,6 +49,7 @@ impl Default for Wanted {
             tile_px: 16,
             window_s: 1.0,
             most: 8,
+            known: None,
         }
     }
 }
@@ -113,6 +118,62 @@ pub struct Shapes {
     pub notes: Vec<String>,
 }
 
+/// A shape as programs read it: lists hold one entry a tile, row by row, `None` where nothing is known.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Object {
+    /// Frequency, Hz.
+    pub hz: f64,
+    /// Side of a tile, px.
+    pub tile: usize,
+    /// Tiles side by side.
+    pub cols: usize,
+    /// Tiles one above the other.
+    pub rows: usize,
+    /// Real and imaginary part of X along x, px: the motion is Re X·e^(2πift), phase against the largest tile.
+    pub x: Vec<Option<[f64; 2]>>,
+    /// The same along y, downwards.
+    pub y: Vec<Option<[f64; 2]>>,
+    /// Standard deviation of a real or imaginary part, the root mean square of both axes, px.
+    pub sd: Vec<Option<f64>>,
+    /// The same of `x`.
+    pub x_sd: Vec<Option<f64>>,
+    /// The same of `y`.
+    pub y_sd: Vec<Option<f64>>,
+    /// Tiles that surely move.
+    pub moves: Vec<bool>,
+    /// µm a px, where it is known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub um_per_px: Option<f64>,
+}
+
+impl Shapes {
+    /// All shapes as programs read them, px to a ten-millionth.
+    pub fn objects(&self, um_per_px: Option<f64>) -> Vec<Object> {
+        let digits = |px: f64| (px * 1e7).round() / 1e7;
+        let pairs = |all: &[Option<Complex64>]| {
+            let pair = |v: &Option<Complex64>| v.map(|v| [digits(v.re), digits(v.im)]);
+            all.iter().map(pair).collect()
+        };
+        let rounded = |all: &[Option<f64>]| all.iter().map(|v| v.map(digits)).collect();
+        let object = |shape: &Shape| Object {
+            hz: shape.hz,
+            tile: self.grid.tile_px(),
+            cols: self.grid.columns(),
+            rows: self.grid.rows(),
+            x: pairs(&shape.x),
+            y: pairs(&shape.y),
+            sd: (0..shape.moves.len())
+                .map(|tile| shape.sd(tile).map(digits))
+                .collect(),
+            x_sd: rounded(&shape.x_sd),
+            y_sd: rounded(&shape.y_sd),
+            moves: shape.moves.clone(),
+            um_per_px,
+        };
+        self.shapes.iter().map(object).collect()
+    }
+}
+
 /// Measures the shapes of a recording. `stop` ends it as if the recording ended there; `step` is called for every frame that
 /// was read, three times for each.
 ///
@@ -149,7 +210,10 @@ pub fn measure_from(
     let (name, camera) = (feed.name.clone(), feed.camera.clone());
     let (width, height) = camera.size;
     let grid = Grid::new(width as u16, height as u16, wanted.tile_px).map_err(ShapesError::Grid)?;
-    let found = tones::find(feed, wanted, &mut step)?;
+    let found = match &wanted.known {
+        Some(tones) => Findings::known(tones.clone(), feed.notes),
+        None => tones::find(feed, wanted, &mut step)?,
+    };
     let mean = Mean::read(&mut open()?, &mut step)?;
     let mut tones = Tones::choose(&name, wanted, found, &camera, mean.seconds())?;
     let run = |hz: &[f64], step: &mut dyn FnMut()| pass::run(&mut open()?, &mean, grid, hz, step);

@@ -11,6 +11,8 @@ use rowtone_clip::{Camera, Feed};
 
 /// A tone that is seen in fewer of the windows than this share is not followed.
 const SEEN: f64 = 0.3;
+/// Windows of a long recording in which tones are looked for.
+const LOOKS: f64 = 8.0;
 /// Tones whose distance from each other, and from each other's images, is less than this over the recording's length cannot be
 /// told apart.
 const APART: f64 = 1.5;
@@ -41,7 +43,20 @@ pub(super) struct Findings {
     nothing: Option<MeasureError>,
 }
 
-/// Looks for tones, window by window.
+impl Findings {
+    /// Tones that need not be looked for.
+    pub(super) fn known(tones: Vec<Found>, notes: Vec<String>) -> Self {
+        Self {
+            nothing: None,
+            warnings: Warnings::NONE,
+            tones,
+            notes,
+        }
+    }
+}
+
+/// Looks for tones, window by window, in [`LOOKS`] windows of the recording or in all that do not overlap: what a window
+/// costs is most of what the shapes cost.
 ///
 /// # Errors
 /// [`ShapesError`] of the input.
@@ -50,9 +65,12 @@ pub(super) fn find(
     wanted: &Wanted,
     step: &mut impl FnMut(),
 ) -> Result<Findings, ShapesError> {
+    let seconds = feed
+        .frames
+        .map_or(0.0, |frames| frames as f64 / feed.camera.fps);
     let settings = Settings {
         window_s: wanted.window_s,
-        hop_s: wanted.window_s / 2.0,
+        hop_s: wanted.window_s.max(seconds / LOOKS),
         ..Settings::default()
     };
     let plan = Plan::new(&feed.camera, &settings)?;

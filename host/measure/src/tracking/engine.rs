@@ -92,9 +92,12 @@ impl<'a> Engine<'a> {
         self.lines.end_round();
     }
 
-    /// A texture that repeats was read at another of its repetitions.
+    /// A texture that repeats was read at another of its repetitions; not known without the feature `long-exposure`.
     pub fn slipped(&self) -> bool {
-        self.lines.tracker().slips() > 0
+        #[cfg(feature = "long-exposure")]
+        return self.lines.tracker().slips() > 0;
+        #[cfg(not(feature = "long-exposure"))]
+        false
     }
 
     /// Measures every line of a frame and hands what came of it to `take`.
