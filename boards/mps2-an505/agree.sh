@@ -7,7 +7,8 @@
 # Without a clip the simulator makes one: lines every 66 us, five tones, 3315 samples a window; one of eight tones;
 # one unlike them, 45 frames a second, lines every 75 us, one tone of 0.4 px; one that creeps by 0.6 px/s, whose reference
 # is moved after it; and one of 256x200 that is measured along both axes. Then the figures must also keep within limits:
-# 3 % above what was measured where that is not less (docs/results.md, "Known faults"): two builds differ by as much.
+# 650 instructions a line and 3000 at worst for the first clip, elsewhere 2 to 3 % above what was measured: two builds differ by
+# as much.
 set -euo pipefail
 root=$(cd "$(dirname "$0")/../.." && pwd)
 rowtone() { (cd "$root" && cargo run --quiet --release -p rowtone-cli -- "$@"); }
@@ -28,7 +29,7 @@ if [ $# = 0 ]; then
     rowtone simulate -o "$folder/creep.y4m" --size 256x252 --fps 59 --line-time-us 66 --exposure-us 500 --seconds 6 --seed 7 \
         --drift 0.6 --tone 31.3:0.3 >&2
     set -- "$folder/five.y4m" --line-time-us 66 --exposure-us 500 --window 1.1016
-    mean_line=690 max_line=3090 max_spectrum=53900000
+    mean_line=650 max_line=3000 max_spectrum=53900000
 fi
 clip=$(realpath "$1")
 shift
@@ -72,13 +73,13 @@ if [ -n "${max_line:-}" ]; then
     within "$eight" max_insn_per_spectrum 94400000
     other=$("$root/boards/mps2-an505/run.sh" "$folder/other.y4m" --line-time-us 75 --exposure-us 500 --icount | grep '^insn_per_line=')
     echo "another clip: $other"
-    within "$other" insn_per_line 724
+    within "$other" insn_per_line 675
     within "$other" max_insn_per_line "$max_line"
     creep=$("$root/boards/mps2-an505/run.sh" "$folder/creep.y4m" "${@}" --icount | grep '^insn_per_line=')
     echo "creeping: $creep"
-    within "$creep" max_insn_per_line 3412
+    within "$creep" max_insn_per_line 3310
     both=$("$root/boards/mps2-an505/run.sh" "$folder/both.y4m" "${@}" --axes xy --icount | grep '^insn_per_line=')
     echo "both axes: $both"
-    within "$both" insn_per_line 1316
+    within "$both" insn_per_line 1310
     within "$both" max_insn_per_line 4848
 fi
