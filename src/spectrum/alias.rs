@@ -12,8 +12,8 @@
 use num_complex::Complex32 as Complex;
 
 use super::blur::blur;
-use super::fit::Model;
 use super::model::Samples;
+use super::parameters::Model;
 use super::phase::Frequency;
 use super::rows;
 use super::shape::{BASIS, CONSTANTS, ORDERS, Shape};

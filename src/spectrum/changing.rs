@@ -1,9 +1,10 @@
 //! Tones that change within the window: what no steady tone explains may be one that speeds up or dies away.
 
 use super::detect::{self, Candidates};
-use super::fit::{Fit, Model};
+use super::fit::Fit;
 use super::judge::Verdict;
 use super::model::Samples;
+use super::parameters::Model;
 use super::residual::Residual;
 use super::search::{BESIDE, Barred, STEPS, Search};
 use super::tone::Tone;

@@ -1,7 +1,8 @@
 //! What is found at an image of a larger tone: a part of its shape, a tone of its own, or what no shape of it follows.
 
-use super::fit::{Fit, Model};
+use super::fit::Fit;
 use super::model::Samples;
+use super::parameters::Model;
 use super::search::Search;
 use super::standing::{A_NUMBER, AS_IMAGE, STEPS, numbers, stands};
 use super::tone::Tone;

@@ -4,8 +4,8 @@
 //! frequency near its own it is slow, and what its changing looks like can be tried on a few points
 //! instead of all samples: how fast it speeds up ([`Demodulated::ramp`]), when it was struck ([`Demodulated::struck`]).
 
-use super::fit::Model;
 use super::model::Samples;
+use super::parameters::Model;
 use super::phase::Frequency;
 use super::tone::Tone;
 use crate::math::{cos_sin, turns};

@@ -1,14 +1,16 @@
 //! The computing side: a window in, tones out.
 
 use super::config::{Config, ConfigError};
-use super::fit::{Fit, Model};
+use super::fit::Fit;
+use super::fourier::MAX_GRID;
 use super::judge::Noise;
 use super::load::Loaded;
 use super::model::{Samples, TABLE_ROWS};
+use super::parameters::Model;
 use super::periodogram::Band;
 use super::residual::Residual;
 use super::search::Search;
-use super::storage::{EstimatorStorage, MAX_GRID};
+use super::storage::EstimatorStorage;
 use super::tones::{Shapes, Telling, Tones};
 use super::window::{SampleBuffer, WindowMark, skew_unit_ns};
 use crate::math::since;

@@ -3,6 +3,9 @@
 
 use microfft::real;
 
+/// Most points of [`EstimatorStorage::grid`](super::EstimatorStorage::grid) that are used.
+pub(crate) const MAX_GRID: usize = 32_768;
+
 /// |Σ x\[t\]·e^(-2πi·kt/n)|² for k = 0 to n/2 - 1 of n = `points.len()` points: a power of two from 64 to
 /// 32 768. `None` for other lengths.
 pub(crate) fn energies(points: &mut [f32]) -> Option<&[f32]> {

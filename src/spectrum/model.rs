@@ -8,14 +8,13 @@ use core::cell::{RefCell, RefMut};
 use num_complex::Complex32 as Complex;
 
 use super::blur::blur;
-use super::fit::Model;
-use super::load::KnowingRows;
-use super::notch::{NOTCHES, Notch};
+use super::knowing::KnowingRows;
+use super::parameters::{Drift, Model};
 use super::phase::Frequency;
-use super::rows;
+use super::rows::{self, NOTCHES, Notch};
 use super::shape::{BASIS, Sight};
 use super::tone::Tone;
-use super::window::SlotCoupling;
+use super::window::{NO_SKEW, SlotCoupling};
 use crate::math::{cos_sin, turns};
 use crate::report::MAX_PEAKS;
 use crate::timeline::Spread;
@@ -26,17 +25,11 @@ pub(crate) const TABLE_ROWS: usize = MAX_PEAKS + 1;
 /// Powers of time a tone's amplitude and phase may need: 1, t, t².
 pub(crate) const POWERS: usize = 3;
 
-/// A sample is skewed where its time is off its frame's and slot's by more than this many steps.
-pub(crate) const NO_SKEW: u16 = 16;
-
 /// Weighted inner products of the residual with t^p·e^(iωt) times each of the shape's polynomials, p from 0.
 pub(crate) type Moments = [[Complex; POWERS]; BASIS];
 
 /// No moments.
 pub(crate) const NO_MOMENTS: Moments = [[Complex::new(0.0, 0.0); POWERS]; BASIS];
-
-/// Slow drift along x and along y: px a window length, px a window length squared.
-pub(crate) type Drift = [[f32; 2]; 2];
 
 /// The window as the passes see it: slices of one length a frame or a slot, tables of one row a tone.
 #[derive(Debug)]
@@ -108,6 +101,16 @@ impl<'a> Samples<'a> {
         let mut copy = spares.find_map(|spare| spare.try_borrow_mut().ok())?;
         copy.copy(model);
         Some(copy)
+    }
+}
+
+impl Model {
+    /// Fills the phasor tables.
+    pub(crate) fn tabulate(&self, samples: &mut Samples<'_>) {
+        for (i, tone) in self.tones.iter().enumerate() {
+            samples.tabulate(i + 1, tone);
+        }
+        samples.set_notches(&self.tones);
     }
 }
 

@@ -9,24 +9,8 @@
 use num_complex::Complex32 as Complex;
 
 use super::model::Samples;
-use super::rows;
+use super::rows::{self, NOTCH_PARTS, Notch};
 use super::tone::Tone;
-
-/// Most notches at once.
-pub(crate) const NOTCHES: usize = 6;
-
-/// Regressors of a notch: cos, sin, t·cos, t·sin.
-const PARTS: usize = 4;
-
-/// A notch at the alias frequency of the tone in table row `table`.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Notch {
-    pub(crate) table: u8,
-    /// Of their weighted inner products over the frames.
-    inverse: [[f32; PARTS]; PARTS],
-    /// Their weighted means over the frames: of E and t·E.
-    mean: [Complex; 2],
-}
 
 impl Samples<'_> {
     /// Makes the notches of those of the tones that have one; the tables are at the tones.
@@ -43,7 +27,7 @@ impl Samples<'_> {
         let n = self.frames;
         let means = self.frame_means(k);
         let mean = [means[0], means[1]];
-        let mut gram = [[0.0_f32; PARTS]; PARTS];
+        let mut gram = [[0.0_f32; NOTCH_PARTS]; NOTCH_PARTS];
         for f in 0..n {
             let e = Complex::new(self.frame_re[k * n + f], self.frame_im[k * n + f]);
             let (a, b) = (e - mean[0], e.scale(self.frame_t[f]) - mean[1]);
@@ -80,7 +64,7 @@ impl Samples<'_> {
             let _ = rows::times(row, &self.frame_t[..n], own);
             let (zero, one) = rows::products(row, own, re, im);
             let sums = [zero.re, zero.im, one.re, one.im];
-            let mut parts = [0.0_f32; PARTS];
+            let mut parts = [0.0_f32; NOTCH_PARTS];
             for (part, row) in parts.iter_mut().zip(&notch.inverse) {
                 *part = row.iter().zip(&sums).map(|(a, s)| a * s).sum::<f32>() / total;
             }
@@ -98,25 +82,25 @@ impl Samples<'_> {
 }
 
 /// Inverse of a symmetric positive definite matrix (Gauss and Jordan); `None` where it is all but singular.
-fn inverse(mut a: [[f32; PARTS]; PARTS]) -> Option<[[f32; PARTS]; PARTS]> {
-    let mut b = [[0.0_f32; PARTS]; PARTS];
+fn inverse(mut a: [[f32; NOTCH_PARTS]; NOTCH_PARTS]) -> Option<[[f32; NOTCH_PARTS]; NOTCH_PARTS]> {
+    let mut b = [[0.0_f32; NOTCH_PARTS]; NOTCH_PARTS];
     for (i, row) in b.iter_mut().enumerate() {
         row[i] = 1.0;
     }
-    for i in 0..PARTS {
+    for i in 0..NOTCH_PARTS {
         let pivot = a[i][i];
         // E and t·E of a frequency near a multiple of half the frame rate have but one phase.
         if pivot.is_nan() || pivot < 1e-5 {
             return None;
         }
-        for j in 0..PARTS {
+        for j in 0..NOTCH_PARTS {
             a[i][j] /= pivot;
             b[i][j] /= pivot;
         }
-        for k in 0..PARTS {
+        for k in 0..NOTCH_PARTS {
             if k != i {
                 let factor = a[k][i];
-                for j in 0..PARTS {
+                for j in 0..NOTCH_PARTS {
                     a[k][j] -= factor * a[i][j];
                     b[k][j] -= factor * b[i][j];
                 }
@@ -139,13 +123,13 @@ mod tests {
             [0.02, 0.0, 0.01, 0.04],
         ];
         let b = inverse(a).unwrap();
-        for i in 0..PARTS {
-            for j in 0..PARTS {
-                let sum: f32 = (0..PARTS).map(|k| a[i][k] * b[k][j]).sum();
+        for i in 0..NOTCH_PARTS {
+            for j in 0..NOTCH_PARTS {
+                let sum: f32 = (0..NOTCH_PARTS).map(|k| a[i][k] * b[k][j]).sum();
                 let want = if i == j { 1.0 } else { 0.0 };
                 assert!((sum - want).abs() < 1e-5);
             }
         }
-        assert!(inverse([[1.0; PARTS]; PARTS]).is_none());
+        assert!(inverse([[1.0; NOTCH_PARTS]; NOTCH_PARTS]).is_none());
     }
 }

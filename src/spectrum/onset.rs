@@ -4,8 +4,8 @@
 //! samples after it: each gains 2·w·x·m − w·m² of it, x what is left without the tone, m what the tone
 //! would be there. The onset is where the sum of all gains from there on is most.
 
-use super::fit::Model;
 use super::model::Samples;
+use super::parameters::Model;
 use super::window::unpack_weight;
 
 /// The onset is looked for so many frames before and after where it is.

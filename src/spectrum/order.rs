@@ -1,8 +1,8 @@
 //! How many coefficients a tone's shape needs: an F test against what is left with more.
 
 use super::alias::{BANDS, Scores, ShapeFit};
-use super::fit::Model;
 use super::model::Samples;
+use super::parameters::Model;
 use super::phase::Frequency;
 use super::shape::ORDERS;
 

@@ -7,8 +7,8 @@
 
 use core::ops::Range;
 
-use super::fit::Model;
 use super::model::Samples;
+use super::parameters::Model;
 use super::window::unpack_weight;
 
 /// Beyond so many standard deviations: one of two million samples of Gaussian noise.

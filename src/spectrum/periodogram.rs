@@ -6,10 +6,9 @@
 //! distribution whose mean is the variance of a sample of average weight, a tone of amplitude A gives
 //! A²N/4. There are one to three places in a cell, which is one over the window's length.
 
-use super::fit::Model;
-use super::fourier::energies;
+use super::fourier::{MAX_GRID, energies};
 use super::model::Samples;
-use super::storage::MAX_GRID;
+use super::parameters::Model;
 use crate::math::sin;
 
 /// What is searched.

@@ -1,9 +1,10 @@
 //! What a model leaves of the window: its periodogram and its noise, kept while the search asks for them.
 
 use super::demodulated::{Demodulated, Struck};
-use super::fit::{Fit, Model};
+use super::fit::Fit;
 use super::judge::Noise;
 use super::model::Samples;
+use super::parameters::Model;
 use super::periodogram::{Band, Periodogram, Places};
 use super::phase::Frequency;
 

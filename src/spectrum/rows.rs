@@ -10,6 +10,22 @@ use num_complex::Complex32 as Complex;
 
 use super::window::unpack_weight;
 
+/// Most notches at once.
+pub(crate) const NOTCHES: usize = 6;
+
+/// Regressors of a notch: cos, sin, t·cos, t·sin.
+pub(super) const NOTCH_PARTS: usize = 4;
+
+/// A notch at the alias frequency of the tone in table row `table`.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Notch {
+    pub(crate) table: u8,
+    /// Of their weighted inner products over the frames.
+    pub(super) inverse: [[f32; NOTCH_PARTS]; NOTCH_PARTS],
+    /// Their weighted means over the frames: of E and t·E.
+    pub(super) mean: [Complex; 2],
+}
+
 /// Samples a turn.
 const LANES: usize = if cfg!(target_arch = "arm") { 2 } else { 8 };
 

@@ -2,9 +2,10 @@
 
 use super::alarm;
 use super::detect::{self, Candidate, Candidates};
-use super::fit::{Fit, Model, drift_powers};
+use super::fit::{Fit, drift_powers};
 use super::largest::{direction, largest};
 use super::model::Samples;
+use super::parameters::Model;
 use super::periodogram::Band;
 use super::phase::Frequency;
 use super::residual::Residual;

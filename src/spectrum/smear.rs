@@ -14,7 +14,7 @@
 //! itself up to 1 px and s = 0.37. It holds while the motion is met by one place of the reference; beyond half a
 //! pixel rows are measured against the next, the sign changes, and all that can be said is how much it may be.
 
-use super::fit::Model;
+use super::parameters::Model;
 use crate::timeline::{Curvature, Group};
 
 /// A motion of no more than this is measured against one place of the reference, px.

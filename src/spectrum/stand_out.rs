@@ -1,10 +1,11 @@
 //! A fitted candidate against the noise as it is, alone or together with what keeps it from standing out.
 
 use super::detect::{self, Candidate, Candidates};
-use super::fit::{Fit, Model};
+use super::fit::Fit;
 use super::judge::Verdict;
 use super::largest::{direction, largest};
 use super::model::Samples;
+use super::parameters::Model;
 use super::phase::Frequency;
 use super::residual::Residual;
 use super::search::{CLOSEST, PAIR, Search};

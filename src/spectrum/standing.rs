@@ -6,10 +6,11 @@
 //! standing shape.
 
 use super::alias::{Scores, ShapeFit};
-use super::fit::{Fit, Model};
+use super::fit::Fit;
 use super::gram::Regressors;
 use super::model::Samples;
 use super::order::Grown;
+use super::parameters::Model;
 use super::phase::Frequency;
 use super::search::Search;
 use super::shape::{ORDERS, Shape};

@@ -7,9 +7,6 @@ use crate::timeline::{Spread, Tally};
 /// Rows of [`EstimatorStorage::frame_rows`]: time, weight and four of scratch.
 pub(crate) const FRAME_ROWS: usize = 6;
 
-/// Most points of [`EstimatorStorage::grid`] that are used.
-pub(crate) const MAX_GRID: usize = 32_768;
-
 /// Rows of [`EstimatorStorage::slot_rows`] for so many channels: time and place among the rows, and for each channel its
 /// weight and two of scratch.
 pub(crate) const fn slot_rows(channels: usize) -> usize {

@@ -9,9 +9,10 @@
 //! Only the product can be seen: 25 for 60 frames a second is the same as a line time 2.4 times too short.
 
 use super::alias::Scores;
-use super::fit::{Fit, Model};
+use super::fit::Fit;
 use super::model::Samples;
 use super::order::is_rare;
+use super::parameters::Model;
 use super::phase::Frequency;
 use super::shape::ORDERS;
 use crate::math::sqrtf;

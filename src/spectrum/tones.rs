@@ -3,11 +3,12 @@
 use num_complex::Complex32 as Complex;
 
 use super::config::Config;
-use super::fit::{Fit, Model};
+use super::fit::Fit;
 use super::gram::Regressors;
 use super::largest::{Orbit, direction, largest};
 use super::model::Samples;
 use super::motion::{Bands, Scale, believe_bands, over_rows};
+use super::parameters::Model;
 use super::periodogram::Band;
 use super::residual::Residual;
 use super::sidebands::{Found, List, name_groups, name_modulations};

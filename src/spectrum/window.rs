@@ -9,6 +9,9 @@ use crate::math::since;
 use crate::report::Warnings;
 use crate::timeline::{Curvature, Group, Sample, Spread, Tally, Vertical};
 
+/// A sample is skewed where its time is off its frame's and slot's by more than this many steps.
+pub(crate) const NO_SKEW: u16 = 16;
+
 /// Samples as they are collected: shift, weight and skew, 8 bytes a sample, and 6 more where they know both axes.
 #[derive(Debug)]
 pub struct SampleBuffer<'a> {

@@ -2,8 +2,9 @@
 
 use core::cell::RefCell;
 
-use super::fit::{Fit, Model};
+use super::fit::Fit;
 use super::judge::Noise;
+use super::parameters::Model;
 use super::tones::Shapes;
 
 /// Models that are in use at once besides the two that stay: a search puts a tone away, gives another one a shape, asks
