@@ -22,6 +22,7 @@ pub mod band;
 mod build;
 mod learned;
 mod meter;
+mod moving;
 pub mod noise;
 mod planar;
 mod recipe;
@@ -30,6 +31,7 @@ mod static_pixels;
 mod storage;
 mod store;
 mod vertical;
+mod work;
 
 #[cfg(feature = "long-exposure")]
 use band::{Level, SLOPE};

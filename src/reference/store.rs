@@ -5,8 +5,8 @@
 //! asks for its row: coefficients, table and mean.
 
 use super::{
-    Build, Parts, Recipe, RowLearning, RowTable, Storage, align::Averaging, background::Background,
-    band::Level, noise::PixelNoise,
+    Build, Parts, Recipe, RowLearning, RowTable, Storage, align::Averaging, band::Level,
+    noise::PixelNoise, work::Background,
 };
 use crate::camera::pixel::Pixel;
 

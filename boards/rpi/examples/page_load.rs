@@ -22,7 +22,7 @@ use rowtone_rpi::capture::{CameraError, Facts, Frame, Shape, Source};
 use rowtone_rpi::config::Config;
 use rowtone_rpi::page;
 use rowtone_rpi::run;
-use rowtone_rpi::session::Shared;
+use rowtone_rpi::shared::Shared;
 
 const WIDTH: u16 = 640;
 const HEIGHT: u16 = 433;

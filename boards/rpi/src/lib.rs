@@ -34,6 +34,7 @@ pub mod run;
 pub mod sensor;
 pub mod session;
 pub mod setup;
+pub mod shared;
 pub mod store;
 pub mod system;
 pub mod uart;

@@ -17,7 +17,7 @@ use rowtone_rpi::config::{Config, ConfigError, Replay, StreamWish};
 use rowtone_rpi::doctor;
 use rowtone_rpi::page;
 use rowtone_rpi::run::{self, log};
-use rowtone_rpi::session::Shared;
+use rowtone_rpi::shared::Shared;
 use rowtone_rpi::uart::TEXT;
 
 /// Where the configuration is unless told otherwise; it may be missing.

@@ -19,8 +19,8 @@ use rowtone_report::json::{self, Place};
 
 use crate::capture::Facts;
 use crate::config::Config;
-use crate::session::{PageWish, Shared};
 use crate::setup::Setup;
+use crate::shared::{PageWish, Shared};
 
 /// How long the output thread may take to use other settings: it looks every 5 ms.
 const PATIENCE: Duration = Duration::from_secs(2);

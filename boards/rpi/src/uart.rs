@@ -15,7 +15,7 @@ use serialport::SerialPort;
 use crate::backoff::Backoff;
 use crate::config::OutputConfig;
 use crate::journal::log;
-use crate::session::Shared;
+use crate::shared::Shared;
 use crate::system;
 
 /// How long a loop waits for a report before it looks at the line again.

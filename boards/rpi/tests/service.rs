@@ -15,8 +15,8 @@ use rowtone_rpi::config::Config;
 use rowtone_rpi::lines::Lines;
 use rowtone_rpi::memory::Memory;
 use rowtone_rpi::run;
-use rowtone_rpi::session::Shared;
 use rowtone_rpi::setup::Setup;
+use rowtone_rpi::shared::Shared;
 
 /// Counts the allocations of the thread that asks.
 struct Counting;
