@@ -17,17 +17,11 @@ pub(super) const STEPS: u32 = 12;
 /// Tones nearer than this are one, turns a window length.
 pub(super) const CLOSEST: f32 = 0.5;
 
-/// Where the ghosts of a tone are, in frame rates from it.
-const GHOSTS: [f32; 4] = [1.0, -1.0, 2.0, -2.0];
-
 /// What is this near to a ghost's place is the ghost, turns a window length.
 const AS_GHOST: f32 = 1.0;
 
 /// What is no steady tone may have ghosts of so many times the power that a steady one's would have.
 const UNLIKE_A_TONE: f32 = 4.0;
-
-/// Power of a tone's ghosts over its own below which they are not tried in its place.
-const LOW_GHOST: f32 = 0.15;
 
 /// With fewer frames, a drift is fitted only where it is seen.
 const FEW_FRAMES: usize = 16;
@@ -43,20 +37,6 @@ const LEAST_KEPT: f32 = 3e-5;
 
 /// A tone this near a larger one may come of its changing within the window, turns a window length.
 pub(super) const BESIDE: f32 = 6.0;
-
-/// Fastest change of frequency tried, turns a window length squared.
-const MOST_CHIRP: f32 = 4.0;
-
-/// Changes of frequency from which a changing tone is refined.
-const CHIRPS: [f32; 7] = [
-    0.0,
-    0.3 * MOST_CHIRP,
-    -0.3 * MOST_CHIRP,
-    0.65 * MOST_CHIRP,
-    -0.65 * MOST_CHIRP,
-    MOST_CHIRP,
-    -MOST_CHIRP,
-];
 
 /// Tones this near each other, turns a window length, are near enough to be noise in a few cells.
 pub(super) const PAIR: f32 = 8.0;
@@ -414,22 +394,6 @@ impl Search {
         })
     }
 
-    /// Power of a steady tone's largest ghosts over its own; 0 where the window has no single frame rate.
-    fn ghost(&self, samples: &Samples<'_>) -> f32 {
-        self.band
-            .fps
-            .map_or(0.0, |fps| samples.ghost(fps).max(samples.ghost(2.0 * fps)))
-    }
-
-    /// Two candidates lie a multiple of the frame rate apart.
-    fn ghostly(&self, samples: &Samples<'_>, a: Candidate, b: Candidate) -> bool {
-        self.band.fps.is_some_and(|fps| {
-            let apart = b.frequency.above(a.frequency);
-            let away = apart - fps * libm::roundf(apart / fps);
-            away.abs() * samples.length_s < 1.5
-        })
-    }
-
     /// Where to refine a candidate from. Near a multiple of the frame rate a tone looks much like one as far on the
     /// multiple's other side, or nearer to it and larger, and no small steps lead from one to the other.
     fn starts(
@@ -469,74 +433,6 @@ impl Search {
         self.sound(samples, model)
     }
 
-    /// A tone that changes within the window has others beside it in a steady model. Where what is `beside` is near a
-    /// larger tone, and that one's frequency and amplitude changing instead lowers the sum of squares by more than `share`,
-    /// this is what `with` becomes: the model with a further tone there. Without one, where none could be put, `model` does.
-    fn modulate(
-        &self,
-        samples: &mut Samples<'_>,
-        fit: &mut Fit,
-        model: &mut Model,
-        with: Option<&mut Model>,
-        beside: Frequency,
-        share: f32,
-    ) -> bool {
-        let length_s = samples.length_s;
-        let near = |tone: &Tone| beside.above(tone.frequency) * length_s;
-        let Some(i) = model.tones.iter().position(|t| near(t).abs() < BESIDE) else {
-            return false;
-        };
-        let so_far = with.as_deref().unwrap_or(model);
-        let (Some(old), Some(a)) = (model.tones.get(i), so_far.tones.get(i)) else {
-            return false;
-        };
-        let pa = a.shape.power();
-        let further = so_far.tones.get(model.tones.len());
-        let pb = further.map_or(0.0, |b| b.shape.power());
-        let center = old
-            .frequency
-            .plus(pb / (pa + pb) * beside.above(a.frequency));
-        let (to_beat, once) = (so_far.squares, further.is_none());
-        for chirp in CHIRPS {
-            if self.tired(fit) {
-                break;
-            }
-            let Some(mut trial) = samples.copy_of(model) else {
-                break;
-            };
-            match trial.tones.get_mut(i) {
-                Some(tone) if tone.frozen => break,
-                Some(tone) if !tone.modulated && chirp == 0.0 => tone.modulated = true,
-                Some(tone) if !tone.modulated => {
-                    tone.shape.clear();
-                    *tone = Tone {
-                        modulated: true,
-                        chirp,
-                        shape: tone.shape,
-                        ..Tone::steady(center, 0)
-                    };
-                }
-                _ => break,
-            }
-            fit.refine(samples, &mut trial, STEPS);
-            let stayed = trial.tones.get(i).is_some_and(|tone| {
-                tone.chirp.abs() < 2.0 * MOST_CHIRP
-                    && (tone.frequency.above(center) * length_s).abs() < BESIDE
-            });
-            if stayed && to_beat - trial.squares > share * trial.squares {
-                let sound = self.sound(samples, &trial);
-                if sound {
-                    with.unwrap_or(model).copy(&trial);
-                }
-                return sound;
-            }
-            if once {
-                break;
-            }
-        }
-        false
-    }
-
     /// Every tone is within the band, not hidden, and apart from the others.
     pub(super) fn sound(&self, samples: &Samples<'_>, model: &Model) -> bool {
         let length_s = samples.length_s;
@@ -552,98 +448,6 @@ impl Search {
                 && within
                 && (tone.modulated || samples.kept(&samples.frame_means(i + 1)) > LEAST_KEPT)
         })
-    }
-
-    /// Tries each tone's ghosts, k frame rates away, in its place.
-    fn exchange(&self, samples: &mut Samples<'_>, fit: &mut Fit, model: &mut Model) -> bool {
-        let Some(fps) = self.band.fps else {
-            return false;
-        };
-        // With little blank time ghosts are too low to be taken for the tone, even two at one place.
-        if self.ghost(samples) < LOW_GHOST {
-            return false;
-        }
-        let mut changed = false;
-        for i in 0..model.tones.len() {
-            let free = |t: &&Tone| !t.modulated && !t.frozen;
-            let tone = model.tones.get(i).filter(free);
-            let (Some(axis), false) = (tone.and_then(|t| t.shape.rigid_axis()), self.tired(fit))
-            else {
-                continue;
-            };
-            let ghosts = self.ghosts(samples, fit, model, i, fps);
-            let Some(mut without) = samples.copy_of(model) else {
-                break;
-            };
-            without.tones.swap_remove(i);
-            for candidate in &ghosts {
-                let Some(mut trial) = samples.copy_of(&without) else {
-                    break;
-                };
-                if self.put(
-                    samples,
-                    fit,
-                    &mut trial,
-                    Tone::steady(candidate.frequency, axis),
-                ) && trial.squares < 0.9999 * model.squares
-                {
-                    model.copy(&trial);
-                    changed = true;
-                    break;
-                }
-            }
-        }
-        changed
-    }
-
-    /// Places k frame rates from tone `i` where, without it, the residual holds at least half as much as at its own.
-    fn ghosts(
-        &self,
-        samples: &mut Samples<'_>,
-        fit: &mut Fit,
-        model: &Model,
-        i: usize,
-        fps: f32,
-    ) -> heapless::Vec<Candidate, { GHOSTS.len() }> {
-        let mut ghosts = heapless::Vec::new();
-        let Some(mut probes) = samples.copy_of(model) else {
-            return ghosts;
-        };
-        let Some(tone) = probes.tones.get_mut(i) else {
-            return ghosts;
-        };
-        let own = tone.frequency;
-        let axis = tone.shape.rigid_axis().unwrap_or(0);
-        tone.shape.clear();
-        tone.modulated = false;
-        let first = probes.tones.len();
-        for k in GHOSTS {
-            let frequency = own.plus(k * fps);
-            let hz = frequency.hz();
-            let within = hz > self.band.lowest_hz && hz < self.band.highest_hz;
-            let free = model
-                .tones
-                .iter()
-                .all(|t| t.frequency.above(frequency).abs() * samples.length_s > CLOSEST);
-            if within && free && first + ghosts.len() < samples.most_tones() {
-                let _ = probes.tones.push(Tone::steady(frequency, axis));
-                let _ = ghosts.push(Candidate {
-                    axis,
-                    frequency,
-                    gain: 0.0,
-                });
-            }
-        }
-        if ghosts.is_empty() {
-            return ghosts;
-        }
-        fit.evaluate(samples, &mut probes);
-        let here = fit.held(i, axis);
-        for (j, ghost) in ghosts.iter_mut().enumerate() {
-            ghost.gain = fit.held(first + j, axis);
-        }
-        ghosts.retain(|g| g.gain > 0.5 * here);
-        ghosts
     }
 
     /// Drops tones that no longer lower the sum of squares enough beside the others.

@@ -8,13 +8,14 @@ mod binner;
 mod group;
 mod ladder;
 mod lateness;
+mod open;
 mod tally;
 mod vertical;
 
 pub use binner::Binner;
-pub(crate) use binner::{Begin, RowShift};
 pub use group::{BinnerError, Group, rows_per_sample};
 pub(crate) use lateness::Lateness;
+pub(crate) use open::{Begin, RowShift};
 pub use tally::Tally;
 
 /// How far one row is shifted against its reference.

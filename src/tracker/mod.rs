@@ -19,6 +19,7 @@ mod gap;
 mod learn;
 mod light;
 mod line;
+mod locate;
 mod memory;
 mod overlap;
 #[cfg(feature = "long-exposure")]
