@@ -46,6 +46,10 @@ const SMALL_PX: f32 = 0.4;
 const SOUGHT_STEPS: usize = 4;
 const SOUGHT: usize = 2 * SOUGHT_STEPS + 1;
 const SEEKING_ROWS: u8 = 3;
+/// A row that looks for it knows its place to a fifth of a pixel, 1/px², and leaves less than this share of the mean where
+/// it is found: else it fits anywhere.
+const SEEKING_INFORMATION: f32 = 25.0;
+const SURELY_LESS: f32 = 0.8;
 /// Columns that are compared then.
 const SOUGHT_COLUMNS: usize = 48;
 
@@ -216,7 +220,7 @@ impl Tracker<'_> {
     /// The row of the reference that a line is read against, after it was looked for where that is needed; `None` where it is
     /// not in the picture. Along the rows alone, it is the line's own.
     pub(super) fn reference_row<P: Pixel>(&mut self, row: usize, pixels: &[P]) -> Option<usize> {
-        if self.planar.seeking > 0 {
+        if self.planar.seeking > 0 && self.tells_of_down(row) {
             self.seek(row, pixels);
         }
         let planar = &mut self.planar;
@@ -224,6 +228,13 @@ impl Tracker<'_> {
         let row = row.checked_add_signed(-(planar.whole as isize));
         planar.read_row = row.filter(|&row| row < self.store.rows());
         planar.read_row
+    }
+
+    /// The row knows enough of its place along the columns to look for the picture by it: a blank one fits anywhere, and
+    /// would lead those below it astray.
+    fn tells_of_down(&self, row: usize) -> bool {
+        let knows = |t: &VerticalTable| t.information_per_px2() > SEEKING_INFORMATION;
+        self.store.vertical_table(row).is_some_and(knows)
     }
 
     /// Looks for a picture that moves by whole rows.
@@ -257,7 +268,10 @@ impl Tracker<'_> {
         let least = (-(SOUGHT_STEPS as i32)..)
             .zip(sought)
             .min_by(|a, b| a.1.total_cmp(&b.1));
-        if let Some((steps, left)) = least {
+        let usual = sought.iter().sum::<f32>() / SOUGHT as f32;
+        if let Some((steps, left)) = least
+            && left < SURELY_LESS * usual
+        {
             let here = left >= middle;
             planar.whole = if here { 0 } else { steps * stride };
             (planar.down_px, planar.near_px, planar.information) = (0.0, 0.0, 0.0);
