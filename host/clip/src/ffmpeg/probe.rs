@@ -35,7 +35,12 @@ pub struct Probe {
     pub frames: u64,
     /// Those of them that are key frames.
     pub key_frames: u64,
+    /// Bytes that code them.
+    pub bytes: u64,
 }
+
+/// A codec that has so few bits a pixel cannot keep a sensor's noise, nor what moves by less than it.
+const SPARSE_BITS: f64 = 0.03;
 
 impl Probe {
     /// The file holds times that a recorder wrote. Formats that only string pictures together have none,
@@ -64,6 +69,12 @@ impl Probe {
     pub fn is_predicted(&self) -> bool {
         self.key_frames < self.frames
     }
+
+    /// They are, and by so few bits that small motions cannot all be there.
+    pub fn is_sparse(&self) -> bool {
+        let pixels = f64::from(self.width) * f64::from(self.height) * self.frames as f64;
+        self.is_predicted() && self.bytes > 0 && 8.0 * (self.bytes as f64) < SPARSE_BITS * pixels
+    }
 }
 
 /// Asks ffprobe what `path` holds.
@@ -90,6 +101,8 @@ struct Packet {
     pts: Option<i64>,
     #[serde(default)]
     flags: String,
+    /// Bytes, as text.
+    size: Option<String>,
 }
 
 #[derive(Deserialize)]
@@ -179,6 +192,10 @@ pub fn parse(json: &[u8]) -> Result<Probe, Error> {
             .iter()
             .filter(|packet| packet.flags.contains('K'))
             .count() as u64,
+        bytes: shown
+            .iter()
+            .filter_map(|packet| packet.size.as_deref()?.parse::<u64>().ok())
+            .fold(0, u64::saturating_add),
     })
 }
 
@@ -217,7 +234,8 @@ mod tests {
     /// What ffprobe says of a phone's clip that was filmed upright, shortened.
     const PHONE: &str = r#"{
         "packets": [
-            {"pts": 0, "flags": "K__"}, {"pts": 60, "flags": "__"}, {"pts": 20, "flags": "___"},
+            {"pts": 0, "size": "40900", "flags": "K__"}, {"pts": 60, "size": "900", "flags": "__"},
+            {"pts": 20, "flags": "___"},
             {"pts": 40, "flags": "_D"}, {"pts": -20, "flags": "KD"}
         ],
         "programs": [],
@@ -241,6 +259,12 @@ mod tests {
             ("h264", "yuv420p")
         );
         assert_eq!(probe.full_range, Some(false));
+        assert_eq!((probe.bytes, probe.is_sparse()), (41_800, false));
+        let fewer = Probe {
+            bytes: 2000,
+            ..probe.clone()
+        };
+        assert!(fewer.is_sparse());
         assert_eq!((probe.frames, probe.key_frames), (3, 1));
         assert_eq!(probe.times_ns, [0, 33_333_333, 100_000_000]);
         assert!((probe.fps.unwrap() - 29.9546).abs() < 1e-4);

@@ -11,7 +11,7 @@ use super::showinfo::{Said, understand};
 /// What ffprobe is asked for: the stream, and of each packet its time and whether it is a key frame.
 const ENTRIES: &str = "stream=codec_name,width,height,pix_fmt,color_range,field_order,time_base,\
                        avg_frame_rate,r_frame_rate:stream_tags=rotate:stream_side_data=rotation:\
-                       packet=pts,flags:format=format_name";
+                       packet=pts,flags,size:format=format_name";
 
 /// Options of ffmpeg that some versions in use lack.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -8,7 +8,7 @@ use rowtone::timeline::{Displacement, Group, Sample};
 
 use super::codec;
 use super::region::{self, Choice, Region};
-use super::vet::Vet;
+use super::together::Together;
 use super::{Chosen, Ending, Engine, Finale, FrameShifts, Wanted, background};
 use crate::MeasureError;
 use rowtone_clip::ffmpeg::{FrameKind, Probe};
@@ -22,6 +22,8 @@ const LEARN_FRAMES: usize = 30;
 /// may be less than a period.
 const CHOOSE_S: f64 = 0.5;
 const CHOOSE_FRAMES: usize = 256;
+/// The rows of a frame that is read in this time are measured together where a codec has been at them, ns.
+const BRIEF_NS: f64 = 4e6;
 /// Frames of the first round.
 const ROUGH_FRAMES: usize = 10;
 /// Key frames that their own reference is learned from.
@@ -100,16 +102,25 @@ fn measure_all(
         width: region.columns.len(),
         height: region.rows.len(),
     };
-    if codec::is_between(first, &seen) {
+    let probe = feed.about.probe.as_ref();
+    if probe.is_some_and(Probe::is_sparse) || codec::is_between(first, &seen) {
         lines.found.insert(Warning::Compressed);
-        // With a rolling shutter each row is of another time.
-        let at_once = feed.camera.timing.is_global_shutter();
-        lines.vet = at_once.then(|| Vet::new(part.height));
-        let predicted = |probe: &Probe| probe.key_frames < probe.frames;
-        let keyed = groups.is_some()
-            && camera_has_none(feed)
-            && feed.about.probe.as_ref().is_some_and(predicted);
-        lines.keys = keyed.then(Vec::new);
+        let keyed =
+            groups.is_some() && camera_has_none(feed) && probe.is_some_and(Probe::is_predicted);
+        lines.together = is_brief(&feed.camera).then(|| {
+            let columns = Rect {
+                x: seen.x,
+                width: seen.width,
+                ..part
+            };
+            let first = seen.y - part.y;
+            let exposed = (feed.camera.timing, axes);
+            let rows = first..first + seen.height;
+            Together::learn((columns, rows), exposed, groups, &kept)
+        });
+        // The few key frames of a high-speed recording of so few bits see too little of a period.
+        let few = lines.together.is_some() && probe.is_some_and(Probe::is_sparse);
+        lines.keys = (keyed && !few).then(Vec::new);
         if let Some(chosen) = &mut lines.chosen {
             chosen.keyed = keyed;
         }
@@ -129,6 +140,12 @@ fn measure_all(
         warning,
         keys: samples,
     })
+}
+
+/// A frame is exposed within so short a time that its rows follow one smooth motion.
+fn is_brief(camera: &Camera) -> bool {
+    let rows = camera.size.1 as f64;
+    f64::from(camera.timing.line_time_ps()) * 1e-3 * rows <= BRIEF_NS
 }
 
 /// No background is subtracted, whose key frames would have to be measured too.
@@ -215,8 +232,8 @@ struct Lines<'a> {
     still: Option<Engine<'a>>,
     /// The background's rows of this frame.
     still_rows: Vec<Displacement>,
-    /// Where a codec has been at the rows.
-    vet: Option<Vet>,
+    /// Where a codec has been at rows that were exposed nearly at once.
+    together: Option<Together>,
     /// The key frames, where a codec took something of the others.
     keys: Option<Vec<Frame>>,
     /// Rows are combined to readings.
@@ -267,7 +284,7 @@ impl<'a> Lines<'a> {
             moving,
             still,
             still_rows: Vec::new(),
-            vet: None,
+            together: None,
             keys: None,
             combines: groups.is_some(),
             slips_told: false,
@@ -365,24 +382,31 @@ impl<'a> Lines<'a> {
         shifts.rows.clear();
         shifts.readings.clear();
         let (rows, readings) = (&mut shifts.rows, &mut shifts.readings);
-        match &mut self.still {
-            None if self.combines && self.vet.is_none() => {
+        match (&mut self.still, &mut self.together) {
+            (None, None) if self.combines => {
                 self.moving
                     .measure_into(&frame, |reading| readings.push(reading));
             }
-            still => {
-                self.moving.measure(&frame, |row| rows.push(row));
-                if let Some(vet) = &mut self.vet {
-                    vet.weigh(rows);
-                }
+            (still, together) => {
+                let became = match together {
+                    Some(together) => Some(together.measure((frame.number, &frame), rows)),
+                    None => {
+                        self.moving.measure(&frame, |row| rows.push(row));
+                        None
+                    }
+                };
                 if let Some(still) = still {
                     self.still_rows.clear();
                     still.measure(&frame, |row| self.still_rows.push(row));
                     background::subtract(rows, &self.still_rows);
                 }
-                if self.combines {
-                    self.moving
-                        .combine(rows.drain(..), |reading| readings.push(reading));
+                let take = |reading| readings.push(reading);
+                match (together, became) {
+                    _ if !self.combines => {}
+                    (Some(together), Some(became)) => {
+                        together.combine(rows.drain(..), (frame.number, became), take);
+                    }
+                    _ => self.moving.combine(rows.drain(..), take),
                 }
             }
         }

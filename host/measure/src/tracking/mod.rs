@@ -12,7 +12,7 @@ mod codec;
 mod engine;
 mod lines;
 pub mod region;
-mod vet;
+mod together;
 
 use rowtone::pipeline::Reading;
 use rowtone::report::Warnings;
@@ -121,7 +121,7 @@ impl Shifts {
         let (outlet, inlet) = ring(BLOCKS * BLOCK_FRAMES / block, block);
         let (frames, name) = (feed.frames, feed.name.clone());
         let probe = feed.about.probe.as_ref();
-        let predicted = probe.is_some_and(|probe| probe.key_frames < probe.frames);
+        let predicted = probe.is_some_and(rowtone_clip::ffmpeg::Probe::is_predicted);
         let axes = axes_of_both(&part, &camera);
         // Made here and dropped at once: a part that cannot be measured is refused before anything
         // is read.
