@@ -7,6 +7,7 @@ use crate::output::Out;
 use host_sim::Scene;
 use rowtone_lab::calibrations;
 use rowtone_lab::line_scenes::{case, region, slips, table as line_table};
+use rowtone_lab::machine_scenes::{case as machine_case, score as machine_score};
 use rowtone_lab::shape_scenes::case::{Case, KINDS};
 use rowtone_lab::shape_scenes::score as shape_score;
 use rowtone_lab::spectrum_scenes::score::Score;
@@ -40,6 +41,10 @@ enum What {
     Lines(Lines),
     /// Parts that vibrate in known shapes: how near `rowtone shapes` is to the truth, and to its own deviations
     Shapes(ShapesOptions),
+    /// Machines that bend, turn and move in parts: tones, images at f ± k·fps, amplitudes
+    Machines(Machines),
+    /// Cameras with faults before a rigid tone: what each costs
+    Faults(Machines),
     /// What `--roi auto` chooses where all of the picture vibrates, or a part of it
     Region(Region),
     /// How often stripes are read at the wrong stripe where they move by 8 px peak to peak
@@ -104,6 +109,28 @@ struct ShapesOptions {
     /// A picture like a photograph in place of speckle
     #[arg(long)]
     photo: bool,
+}
+
+/// Options of `rowtone sweep machines` and `rowtone sweep faults`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+192x240 px at 60 fps, 48 us a row, 0.2 ms exposed, 2 s each, tones of 40 to 420 Hz. Columns: windows; tones in them,
+those found and sure, those found and ambiguous; rms of the frequency's error over its stated deviation; rms and
+largest error of the amplitude at its largest row; the largest sure peak at f + k*fps against its tone; windows with
+another sure peak; all words of warning.
+
+Example:
+  rowtone sweep machines --seeds 3 --only cantilever")]
+struct Machines {
+    /// Recordings of each kind
+    #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u64).range(1..))]
+    seeds: u64,
+    /// The first recording's number
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Only kinds with this in their name
+    #[arg(long, value_name = "TEXT", default_value = "")]
+    only: String,
 }
 
 /// Options of `rowtone sweep region`.
@@ -286,6 +313,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         What::Calibration(options) => calibration(options),
         What::Lines(options) => lines(options),
         What::Shapes(options) => shapes(options),
+        What::Machines(options) => machines(&machine_case::MACHINES, options),
+        What::Faults(options) => machines(&machine_case::FAULTS, options),
         What::Region(options) => regions(options),
         What::Stripes(options) => stripes(options),
     }
@@ -358,6 +387,22 @@ fn shapes(options: &ShapesOptions) -> Result<(), Failure> {
                 out.line(&shape_score::row(kind.name(), hz, px, &scores))?;
             }
         }
+    }
+    Ok(())
+}
+
+fn machines(kinds: &[machine_case::Kind], options: &Machines) -> Result<(), Failure> {
+    let mut out = Out::default();
+    out.line(&machine_score::head())?;
+    for kind in kinds {
+        if !kind.name.contains(&options.only) {
+            continue;
+        }
+        let mut score = machine_score::Score::default();
+        for seed in options.seed..options.seed + options.seeds {
+            score.add(kind.name, &kind.draw(seed))?;
+        }
+        out.line(&machine_score::row(kind.name, &score))?;
     }
     Ok(())
 }

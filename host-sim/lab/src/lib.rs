@@ -5,6 +5,7 @@
 //! - [`line_scenes`]: recordings with known motion through the tracker, for the line engine's figures;
 //! - [`spectrum_scenes`]: random displacement samples with known tones, for the spectrum's figures;
 //! - [`shape_scenes`]: parts that vibrate in known shapes, for the figures of `rowtone shapes`;
+//! - [`machine_scenes`]: machines that bend, turn and move in parts, and cameras with faults, to the report;
 //! - [`calibrations`]: calibrations of simulated cameras, with the truth;
 //! - [`sound`]: speech and music, and how well a recovered sound agrees with them.
 
@@ -12,7 +13,9 @@ pub mod calibrations;
 mod error;
 pub mod experiments;
 pub mod figure;
+mod filmed;
 pub mod line_scenes;
+pub mod machine_scenes;
 pub mod methods;
 pub mod shape_scenes;
 pub mod sound;

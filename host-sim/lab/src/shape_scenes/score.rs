@@ -1,16 +1,14 @@
 //! A measured shape against the true one.
 
-use std::io::Cursor;
-use std::sync::Arc;
-
-use host_sim::{Camera, y4m};
+use host_sim::Camera;
 use num_complex::Complex64;
-use rowtone_clip::{CameraOptions, Feed, Times};
+use rowtone::tracker::Axes;
 use rowtone_measure::shapes::tones::Found;
 use rowtone_measure::shapes::{self, Shape, Wanted};
 
 use super::case::{Case, SIZE_PX, TILE_PX};
 use crate::LabError;
+use crate::filmed::Filmed;
 
 /// What came of one recording.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -41,42 +39,18 @@ pub fn score(case: &Case) -> Result<Score, LabError> {
         why,
     };
     let camera = Camera::new(case.config.clone()).map_err(simulated)?;
-    let memory = |why| LabError::Write {
-        path: "memory".into(),
-        why,
-    };
-    let mut clip = Vec::new();
-    y4m::write_header(&mut clip, &camera.config().sensor).map_err(memory)?;
-    for frame in camera.frames() {
-        y4m::write_frame(&mut clip, &frame).map_err(memory)?;
-    }
-    let clip: Arc<[u8]> = clip.into();
-    let sensor = &camera.config().sensor;
-    let options = CameraOptions {
-        line_time_us: Some(f64::from(sensor.line_time_ps) * 1e-6),
-        exposure_us: Some(f64::from(sensor.exposure_ns) * 1e-3),
-        ..CameraOptions::of("the simulated recording")
-    };
-    let starts: Vec<i64> = camera.arriving().map(|slot| slot.start_ns).collect();
-    let times = Times::new(starts, Some(sensor.fps)).ok_or(LabError::NoFrame)?;
     // That the tone is found is what other sweeps measure, and most of the time that it takes.
     let tone = Found {
         hz: case.hz,
         amplitude_px: case.px,
     };
+    let filmed = Filmed::new(&camera, Axes::Xy)?;
     let wanted = Wanted {
         tile_px: TILE_PX,
         known: Some(vec![tone]),
         ..Wanted::default()
     };
-    let open = || {
-        Ok(Feed::at_times(
-            &options,
-            Cursor::new(Arc::clone(&clip)),
-            times.clone(),
-        )?)
-    };
-    let shapes = shapes::measure_from(open, &wanted, || ())?;
+    let shapes = shapes::measure_from(|| Ok(filmed.feed()?), &wanted, || ())?;
     let shape = shapes.shapes.first().ok_or(LabError::NoReport)?;
     Ok(compared(case, shape))
 }

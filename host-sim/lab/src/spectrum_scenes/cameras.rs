@@ -4,17 +4,17 @@
 //! such that the blank time is as drawn.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
-use std::io::Cursor;
 
 use rowtone::report::Report;
 use rowtone::timeline::{Sample, Spread};
+use rowtone::tracker::Axes;
 
 use super::bound::Bound;
 use super::scene::{Draw, TrueTone, Truth};
 use super::score::Score;
 use crate::LabError;
-use host_sim::{Camera, Optics, Preset, SimError, crlb, y4m};
-use rowtone_clip::{CameraOptions, Feed, Times};
+use crate::filmed::Filmed;
+use host_sim::{Camera, Optics, Preset, SimError, crlb};
 use rowtone_measure::analysis::{Analysis, Event, Plan, Settings};
 use rowtone_measure::tracking::Shifts;
 
@@ -108,24 +108,7 @@ impl Recording {
     /// # Errors
     /// [`LabError`] as `rowtone analyze`.
     pub fn analyze(&self) -> Result<Report, LabError> {
-        let mut clip = Vec::new();
-        let to_memory = |why| LabError::Write {
-            path: "memory".into(),
-            why,
-        };
-        y4m::write_header(&mut clip, &self.camera.config().sensor).map_err(to_memory)?;
-        for frame in self.camera.frames() {
-            y4m::write_frame(&mut clip, &frame).map_err(to_memory)?;
-        }
-        let sensor = &self.camera.config().sensor;
-        let args = CameraOptions {
-            line_time_us: Some(f64::from(sensor.line_time_ps) * 1e-6),
-            exposure_us: Some(f64::from(sensor.exposure_ns) * 1e-3),
-            ..CameraOptions::of("the simulated recording")
-        };
-        let starts = self.camera.arriving().map(|slot| slot.start_ns).collect();
-        let times = Times::new(starts, Some(sensor.fps)).ok_or(LabError::NoFrame)?;
-        let feed = Feed::at_times(&args, Cursor::new(clip), times)?;
+        let feed = Filmed::new(&self.camera, Axes::X)?.feed()?;
         let plan = Plan::new(
             &feed.camera,
             &Settings {

@@ -91,23 +91,23 @@ pub struct Scene {
 }
 
 /// Random numbers of a scene.
-pub(super) struct Draw(ChaCha8Rng);
+pub(crate) struct Draw(ChaCha8Rng);
 
 impl Draw {
     /// Those of scene `number` of the series `seed`.
-    pub(super) fn new(seed: u64, number: u64) -> Self {
+    pub(crate) fn new(seed: u64, number: u64) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream(number);
         Self(rng)
     }
 
     /// Evenly from 0 to 1.
-    pub(super) fn unit(&mut self) -> f64 {
+    pub(crate) fn unit(&mut self) -> f64 {
         (self.0.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
     }
 
     /// Evenly from a range.
-    pub(super) fn from(&mut self, range: [f64; 2]) -> f64 {
+    pub(crate) fn from(&mut self, range: [f64; 2]) -> f64 {
         range[0] + (range[1] - range[0]) * self.unit()
     }
 
