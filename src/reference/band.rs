@@ -52,7 +52,7 @@ impl Level {
 
     /// Right half f\[1\], f\[2\], … of the antisymmetric filter, 1/px: the band-passed derivative is
     /// Σₖ f\[k\]·(r(x + k) − r(x − k)).
-    pub const fn half_filter(self) -> &'static [f32] {
+    pub(crate) const fn half_filter(self) -> &'static [f32] {
         // Central differences of tenth and of sixth order (Fornberg 1988, table 1); the others are the
         // latter convolved with (1 2 1)/4 once and twice.
         match self {

@@ -28,4 +28,3 @@ pub use check::{EncodeError, MAX_VALUE, check_report};
 pub use format::Format;
 pub use message::{Message, REPLY_LEN, Reply, SettingsOrigin, Status};
 pub use sequence::{Arrival, Sequence};
-pub use slice::SliceWriter;

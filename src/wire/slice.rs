@@ -4,20 +4,15 @@ use core::fmt;
 
 /// Writes text into a lent slice and remembers how much of it is used.
 #[derive(Debug)]
-pub struct SliceWriter<'a> {
+pub(crate) struct SliceWriter<'a> {
     buffer: &'a mut [u8],
     used: usize,
 }
 
 impl<'a> SliceWriter<'a> {
     /// Starts at the slice's first byte.
-    pub fn new(buffer: &'a mut [u8]) -> Self {
+    pub(crate) fn new(buffer: &'a mut [u8]) -> Self {
         Self { buffer, used: 0 }
-    }
-
-    /// What was written.
-    pub fn written(&self) -> &[u8] {
-        self.buffer.get(..self.used).unwrap_or_default()
     }
 
     /// What was written, for as long as the slice was lent.
