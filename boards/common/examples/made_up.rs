@@ -34,8 +34,13 @@ pub(crate) const SWING_PX: f64 = 0.25;
 fn read_row(start_ns: i64, row: u16) -> [u8; WIDTH] {
     let phase = std::f64::consts::TAU * SWING_HZ * start_ns as f64 * 1e-9;
     let moved = SWING_PX * phase.sin();
-    let noise =
-        |x: usize| ((x * 7919 + start_ns as usize / 999) * 104_729 % 97) as f64 / 48.0 - 1.0;
+    // SplitMix64 (Steele, Lea and Flood 2014) of time and column: what repeats would be a motion of its own.
+    let noise = |x: usize| {
+        let mut h = start_ns as u64 ^ (x as u64) << 48;
+        h = (h ^ h >> 30).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        h = (h ^ h >> 27).wrapping_mul(0x94D0_49BB_1331_11EB);
+        ((h ^ h >> 31) >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+    };
     std::array::from_fn(|x| {
         let at = x as f64 - moved + 0.31 * f64::from(row);
         (120.0 + 50.0 * (0.7 * at).sin() + 30.0 * (0.37 * at).cos() + noise(x)) as u8
