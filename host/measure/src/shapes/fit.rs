@@ -25,6 +25,8 @@ use rowtone_clip::{Camera, Rect};
 const TURN_IN_BLOCK: f64 = 0.03;
 /// A frequency is set right where all tiles together gain so many standard deviations of chance.
 const SURE: f64 = 6.0;
+/// No frequency is off by more: it was found in windows, or asked for by someone who knows.
+const FARTHEST_HZ: f64 = 0.5;
 /// A tile whose deviation is so many times that of a good one has too little texture.
 const PLAIN: f64 = 8.0;
 /// χ² of four degrees of freedom at 1e-3 over a thousand tiles.
@@ -317,7 +319,7 @@ fn best_shift(phasors: &[[Complex64; 2]], blocks: &[Block]) -> f64 {
         phasors.chunks_exact(times.len()).map(tile).sum()
     };
     // As far as neighbouring blocks tell, finely enough to meet the peak.
-    let reach = 0.4 * times.len() as f64 / span;
+    let reach = (0.4 * times.len() as f64 / span).min(FARTHEST_HZ);
     let step = 0.2 / span;
     let steps = (reach / step) as i32;
     let powers: Vec<f64> = (-steps..=steps)
