@@ -205,7 +205,8 @@ impl<'a> Animation<'a> {
             let phasors = mesh.panel.tiles.get(tile).copied().flatten();
             phasors.map_or(0.0, |p| semi_major(&p)) / mesh.largest_px.max(f64::MIN_POSITIVE)
         };
-        let tiles = |k: &usize| k % columns % stride == 0 && k / columns % stride == 0;
+        let on_mesh = |at: usize| at.is_multiple_of(stride);
+        let tiles = |k: &usize| on_mesh(k % columns) && on_mesh(k / columns);
         for tile in (0..mesh.panel.tiles.len()).filter(tiles) {
             let Some([rest, here]) = node(tile) else {
                 continue;
