@@ -254,6 +254,15 @@ fn the_engineer_reads_what_is_true() {
     assert!(band.abs() < 0.01, "{report}");
     // √(1.756² + …) = 2.3 mm/s is between 1.5 and 4.5.
     assert_eq!(report["zone"], "C", "{report}");
+    let broad = &report["broad_band"]["sum"]["velocity_mm_s_rms"];
+    assert_eq!(broad["value"], report["velocity_mm_s_rms"], "{report}");
+    // Of class 2 zone B is from 1.12 mm/s to 2.8.
+    let mut config = camera(60.0);
+    config.frames = 60;
+    config.motion.tones = truth.iter().map(|&(hz, px)| tone(hz, px)).collect();
+    let options = ["--um-per-px", "40", "--machine", "iso10816-1:class2"];
+    let report = &analyze("machine", config, &options)[0];
+    assert_eq!(report["zone"], "B", "{report}");
 }
 
 /// A few of `rowtone sweep cameras`. A window of noise alone reports a peak once in a thousand: with fixed seeds it did not.

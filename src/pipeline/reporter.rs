@@ -85,14 +85,24 @@ impl<'a> Reporter<'a> {
             lines: mark.lines,
             lost_frames: mark.lost_frames,
             noise_px: tones.row_noise_px,
-            velocity_mm_s_rms: um_per_px.map(|scale| band_velocity(&tones, scale)),
+            velocity_mm_s_rms: um_per_px.map(|scale| velocity_mm_s(&tones, scale)),
             warnings: super::warn::of_window(&mark, &tones, window_s),
             peaks: tones.peaks,
             um_per_px,
             line_time_us_fit: tones.line_time_us_fit,
             noise_floor: tones.noise_floor,
             other_px_rms: tones.other_px_rms,
+            broad_band: tones.broad_band,
         }
+    }
+}
+
+/// Velocity over 10–1000 Hz, mm/s RMS (ISO 20816-1): of all motion, or of the peaks where that is not known.
+fn velocity_mm_s(tones: &Tones, um_per_px: f32) -> f32 {
+    let broad = tones.broad_band.and_then(|b| b.sum.velocity_px_s);
+    match broad {
+        Some(px_s) => px_s.value * um_per_px * 1e-3,
+        None => band_velocity(tones, um_per_px),
     }
 }
 

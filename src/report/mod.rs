@@ -1,11 +1,13 @@
 //! What is said about one window of time, in which units.
 
+mod broadband;
 mod motion;
 mod warnings;
 
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
+pub use broadband::{BroadBand, FROM_HZ, Figure, Measures, SLOW_FROM_HZ, TO_HZ};
 pub use motion::{MAX_SHAPES, Modulation, Motion, PeakShape, SHAPE_ROWS, ShapeRow};
 pub use warnings::{Warning, Warnings};
 
@@ -60,7 +62,8 @@ pub struct Report {
     pub warnings: Warnings,
     /// Scale of the picture, µm a pixel, where the user gave one.
     pub um_per_px: Option<f32>,
-    /// Velocity over 10–1000 Hz, mm/s RMS (ISO 20816's quantity), where there is a scale.
+    /// Velocity over 10–1000 Hz, mm/s RMS (ISO 20816's quantity), both axes as a vector, where there is a scale: of all motion
+    /// where [`Report::broad_band`] is known, else of the peaks.
     pub velocity_mm_s_rms: Option<f32>,
     /// What the line time must be if the frame rate is right, µs: where the motion contradicts the time base
     /// ([`Warning::TimingContradiction`]) and exactly one value fits. Wires of version 1 do not carry it.
@@ -74,6 +77,10 @@ pub struct Report {
     /// part of the floor. 0 where the floor is white. Wires of version 1 do not carry it.
     #[serde(skip)]
     pub other_px_rms: f32,
+    /// Broad-band measures; `None` where a window is too short or its samples lie too far apart. Wires of version 1 do not carry
+    /// them.
+    #[serde(skip)]
+    pub broad_band: Option<BroadBand>,
 }
 
 /// Most points of a noise floor.
@@ -105,6 +112,7 @@ impl Report {
         line_time_us_fit: None,
         noise_floor: Vec::new(),
         other_px_rms: 0.0,
+        broad_band: None,
     };
 }
 

@@ -1,5 +1,6 @@
 //! The computing side: a window in, tones out.
 
+use super::broadband::{self, Given};
 use super::config::{Config, ConfigError};
 use super::fit::Fit;
 use super::fourier::MAX_GRID;
@@ -10,6 +11,7 @@ use super::parameters::Model;
 use super::periodogram::Band;
 use super::residual::Residual;
 use super::search::Search;
+use super::smear::Smear;
 use super::storage::EstimatorStorage;
 use super::tones::{Shapes, Telling, Tones};
 use super::window::{SampleBuffer, WindowMark, skew_unit_ns};
@@ -147,7 +149,7 @@ impl<'a> Estimator<'a> {
         self.loaded = Loaded::take(&mut self.storage, &self.group, frames, from, stride, column);
     }
 
-    /// Fits tones to the loaded window.
+    /// Fits tones to the loaded window, once: its samples are used up.
     pub fn tones(&mut self) -> Tones {
         let l = self.loaded;
         self.storage.workspace.shapes.clear();
@@ -189,6 +191,14 @@ impl<'a> Estimator<'a> {
             work.shapes,
         );
         tones.more |= outcome.more;
+        let (grid, noise) = residual.into_parts();
+        let given = Given {
+            group: &self.group,
+            fps: l.fps,
+            smear: Smear::of(&self.group, self.mark.curvature, model),
+            noise,
+        };
+        tones.broad_band = broadband::measure(&mut samples, model, grid, &given);
         tones
     }
 

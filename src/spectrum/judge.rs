@@ -157,6 +157,15 @@ impl Noise {
         crate::math::sqrtf((self.white - self.floor.quietest()).max(0.0))
     }
 
+    /// Level of its quietest part, px².
+    pub(crate) fn quietest(&self) -> f32 {
+        if self.is_white() {
+            self.white
+        } else {
+            self.floor.quietest()
+        }
+    }
+
     /// What noise of the level at `hz` has there, and of how many cells that is known.
     fn level(&self, hz: f32, p: Option<&Periodogram<'_>>) -> (f32, f32) {
         let Some(segment) = self.floor.at(hz) else {

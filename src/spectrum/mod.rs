@@ -17,6 +17,7 @@
 mod alarm;
 mod alias;
 mod blur;
+mod broadband;
 mod changing;
 mod cholesky;
 mod claim;

@@ -59,6 +59,11 @@ impl<'g> Residual<'g> {
         }
     }
 
+    /// The grid, for another use, and the noise as it was measured last.
+    pub(crate) fn into_parts(self) -> (&'g mut [f32], &'g [Noise; 2]) {
+        (self.grid, self.noise)
+    }
+
     /// Leaves samples out that are far off all others.
     pub(crate) fn leave_outliers_out(&mut self, samples: &mut Samples<'_>, model: &Model) {
         super::outlier::leave_out(samples, model, self.grid);

@@ -16,7 +16,9 @@ use super::smear::Smear;
 use super::timebase::Look;
 use super::tone::Tone;
 use crate::math::sqrtf;
-use crate::report::{FloorPoint, MAX_FLOOR, MAX_PEAKS, MAX_SHAPES, Motion, Peak, PeakShape};
+use crate::report::{
+    BroadBand, FloorPoint, MAX_FLOOR, MAX_PEAKS, MAX_SHAPES, Motion, Peak, PeakShape,
+};
 use crate::timeline::{Curvature, Group};
 
 /// Below this share of an amplitude left by exposure and averaging, a tone is not reported: its amplitude would
@@ -67,6 +69,8 @@ pub struct Tones {
     pub noise_floor: heapless::Vec<FloorPoint, MAX_FLOOR>,
     /// Root mean square of the motion that is no tone, px.
     pub other_px_rms: f32,
+    /// Broad-band measures of tones and all else; `None` where the camera cannot know.
+    pub broad_band: Option<BroadBand>,
     /// Frame rate, Hz; 0 with less than two frames.
     pub fps: f32,
     /// Standard deviation of a sample of average weight, px.

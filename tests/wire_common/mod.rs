@@ -48,6 +48,7 @@ prop_compose! {
             line_time_us_fit: None,
         noise_floor: Default::default(),
         other_px_rms: 0.0,
+        broad_band: None,
         }
     }
 }
@@ -120,6 +121,7 @@ pub fn ordinary_report(seq: u32) -> Report {
         line_time_us_fit: None,
         noise_floor: Default::default(),
         other_px_rms: 0.0,
+        broad_band: None,
     }
 }
 

@@ -39,6 +39,10 @@ pub struct Args {
     /// Where the zones B, C and D of ISO 20816 begin for this machine, mm/s RMS: adds its zone
     #[arg(long, value_name = "B,C,D", requires = "scale")]
     zone_limits: Option<ZoneLimits>,
+    /// Kind of machine whose zones those are, as `iso20816-3:group2:flexible`
+    #[arg(long, value_name = "NAME", requires = "scale", conflicts_with = "zone_limits",
+          value_parser = ZoneLimits::of_machine)]
+    machine: Option<ZoneLimits>,
     /// Format of the reports on standard output
     #[arg(long, value_enum, default_value = "text")]
     format: Format,
@@ -112,7 +116,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         },
         format: args.format,
         name: shifts.name.clone(),
-        zone_limits: args.zone_limits,
+        zone_limits: args.zone_limits.or(args.machine),
         warnings: shifts.camera.warnings,
         progress: Progress::new(shifts.frames),
         out: Out::default(),

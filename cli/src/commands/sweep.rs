@@ -11,7 +11,7 @@ use rowtone_lab::machine_scenes::{case as machine_case, score as machine_score};
 use rowtone_lab::shape_scenes::case::{Case, KINDS};
 use rowtone_lab::shape_scenes::score as shape_score;
 use rowtone_lab::spectrum_scenes::score::Score;
-use rowtone_lab::spectrum_scenes::{cameras, days, few, noise, table};
+use rowtone_lab::spectrum_scenes::{broadband, cameras, days, few, noise, table};
 
 /// Options of `rowtone sweep`.
 #[derive(Debug, clap::Args)]
@@ -31,6 +31,8 @@ enum What {
     Cameras(Cameras),
     /// Noise that is not white and tones that are not steady: what is called a tone, and what is found
     Noise(Noise),
+    /// Broad-band velocity, displacement, acceleration, crest factor and kurtosis against the truth of each window
+    Broadband(Broadband),
     /// The thesis's test: tones of 75 to 325 Hz in a handful of frames at 120 fps, with their bounds
     FewFrames(FewFrames),
     /// Days of samples at 50 000 lines a second through one analyzer: drift, growth, wrapped counters
@@ -217,6 +219,28 @@ struct Spectrum {
     failures: bool,
 }
 
+/// Options of `rowtone sweep broadband`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Random cameras (blank time to 40 %, lost frames, jitter, exposure) that see tones, random vibration or both, along
+one axis or two. Columns: windows; those whose stated deviation is 3 % or less; those of which only a limit is told;
+those whose truth is above the limit that is told; of the sharp ones mean and rms error; rms of error over
+stated deviation of all; the largest error of all windows of a scene together, where all of them are sharp.
+
+Example:
+  rowtone sweep broadband --scenes 50 --windows 10")]
+struct Broadband {
+    /// Scenes of each kind
+    #[arg(long, default_value_t = 50, value_parser = clap::value_parser!(u64).range(1..))]
+    scenes: u64,
+    /// Windows of each scene
+    #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..))]
+    windows: u32,
+    /// Which series of scenes
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+}
+
 /// Options of `rowtone sweep noise`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
@@ -308,6 +332,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         What::Spectrum(options) => spectrum(options),
         What::Cameras(options) => camera_scenes(options),
         What::Noise(options) => noises(options),
+        What::Broadband(options) => broad_bands(options),
         What::FewFrames(options) => few_frames(options),
         What::Days(options) => many_days(options),
         What::Calibration(options) => calibration(options),
@@ -421,6 +446,18 @@ fn spectrum(options: &Spectrum) -> Result<(), Failure> {
     for kind in table::kinds() {
         let score = Score::of(&kind.ranges, options.seed, options.scenes);
         row(kind.name, &score, options.failures)?;
+    }
+    Ok(())
+}
+
+fn broad_bands(options: &Broadband) -> Result<(), Failure> {
+    let mut out = Out::default();
+    out.line(&broadband::head())?;
+    for kind in broadband::Kind::ALL {
+        let scores = broadband::scores(kind, options.seed, options.scenes, options.windows);
+        for (measure, score) in scores.iter().enumerate() {
+            out.line(&broadband::row(kind, measure, score))?;
+        }
     }
     Ok(())
 }

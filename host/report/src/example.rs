@@ -32,5 +32,6 @@ pub fn example(um_per_px: Option<f32>) -> Report {
         line_time_us_fit: None,
         noise_floor: Default::default(),
         other_px_rms: 0.0,
+        broad_band: None,
     }
 }

@@ -3,6 +3,7 @@
 use rowtone::report::{Motion, Peak, PeakShape, Report, ShapeRow};
 use serde::Serialize;
 
+use super::broad::{BroadBandObject, velocity_mm_s};
 use super::zone::ZoneLimits;
 use super::{band_velocity, velocity_mm_s_rms};
 
@@ -22,6 +23,12 @@ struct ReportObject {
     velocity_mm_s_rms: Option<Option<f32>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     zone: Option<char>,
+    /// Where the noise could hide so much that it would be in a worse one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    zone_at_most: Option<char>,
+    /// `null` where a recording was measured and the camera cannot know.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    broad_band: Option<Option<BroadBandObject>>,
     peaks: Vec<PeakObject>,
     #[serde(skip_serializing_if = "Option::is_none")]
     timing: Option<TimingObject>,
@@ -199,6 +206,9 @@ fn to_string(
 ) -> String {
     let (place, timing) = here.unzip();
     let velocity = band_velocity(report);
+    let zone = limits.zip(velocity).map(|(limits, v)| limits.zone(v));
+    let at_most = velocity_mm_s(report).map(|v| f64::from(v.at_most));
+    let at_most = limits.zip(at_most).map(|(limits, v)| limits.zone(v));
     let object = ReportObject {
         seq: report.seq,
         t_s: report.time_ms as f64 / 1000.0,
@@ -210,7 +220,12 @@ fn to_string(
         place,
         velocity_mm_s_rms: (place.is_some() || velocity.is_some())
             .then(|| velocity.map(|v| v as f32)),
-        zone: limits.zip(velocity).map(|(limits, v)| limits.zone(v)),
+        zone,
+        zone_at_most: at_most.filter(|at_most| zone.is_some_and(|zone| zone != *at_most)),
+        broad_band: (place.is_some() || report.broad_band.is_some()).then(|| {
+            let known = report.broad_band.as_ref();
+            known.map(|broad| BroadBandObject::new(broad, report.um_per_px))
+        }),
         peaks: report
             .peaks
             .iter()
@@ -287,7 +302,7 @@ mod tests {
         };
         let text = super::measured(&report, &[shape], place, None);
         assert!(text.contains(
-            r#""noise_px":0.0131,"roi":[4,0,120,300],"axes":"x","velocity_mm_s_rms":null,"peaks""#
+            r#""noise_px":0.0131,"roi":[4,0,120,300],"axes":"x","velocity_mm_s_rms":null,"broad_band":null,"peaks""#
         ));
         assert!(
             text.contains(concat!(

@@ -1,8 +1,10 @@
 //! Reports as JSON Lines and as text, and what stands in neither and follows from both: velocities,
 //! zones, the names of warnings.
 
+mod broad;
 mod example;
 pub mod json;
+pub mod machine;
 pub mod text;
 pub mod zone;
 

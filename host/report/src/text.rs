@@ -4,6 +4,7 @@ use std::fmt::Write;
 
 use rowtone::report::{Peak, Report};
 
+use super::broad::{self, velocity_mm_s};
 use super::zone::ZoneLimits;
 use super::{band_velocity, sentence, velocity_mm_s_rms};
 
@@ -25,13 +26,19 @@ pub fn zoned(report: &Report, limits: Option<&ZoneLimits>) -> String {
     );
     // Writing to a string cannot fail.
     if let Some(velocity) = band_velocity(report) {
-        let _ = write!(text, ", {velocity:.3} mm/s RMS (10-1000 Hz)");
+        let figure = velocity_mm_s(report)
+            .as_ref()
+            .map_or_else(|| format!("{velocity:.3}"), broad::words);
+        let _ = write!(text, ", {figure} mm/s RMS (10-1000 Hz)");
         if let Some(limits) = limits {
             let _ = write!(text, ", zone {}", limits.zone(velocity));
         }
     }
     if report.peaks.is_empty() {
         text.push_str("\n            no vibration above the noise");
+    }
+    if let Some(broad) = &report.broad_band {
+        let _ = write!(text, "\n            {}", broad::line(broad));
     }
     for peak in &report.peaks {
         let _ = write!(text, "\n{}", peak_line(peak, report.um_per_px));

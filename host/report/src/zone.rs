@@ -1,9 +1,11 @@
 //! Evaluation zones after ISO 20816: A (as new) to D (damaging).
 //!
-//! The limits between them depend on the kind of machine and its mounting, so there are none here: the user gives
+//! The limits between them depend on the kind of machine and its mounting: the user names one ([`super::machine`]), or gives
 //! those of the part of the standard that applies.
 
 use std::str::FromStr;
+
+use super::machine::MACHINES;
 
 /// Velocities, mm/s RMS, from which on a machine is in zone B, C and D.
 ///
@@ -18,6 +20,28 @@ use std::str::FromStr;
 pub struct ZoneLimits([f64; 3]);
 
 impl ZoneLimits {
+    /// Those of a kind of machine, by its name in [`MACHINES`].
+    ///
+    /// # Errors
+    /// A line with all names, for one that is none of them.
+    ///
+    /// ```
+    /// use rowtone_report::zone::ZoneLimits;
+    /// let limits = ZoneLimits::of_machine("iso20816-3:group2:flexible")?;
+    /// assert_eq!(limits.zone(3.0), 'B');
+    /// assert!(ZoneLimits::of_machine("toaster").is_err());
+    /// # Ok::<(), String>(())
+    /// ```
+    pub fn of_machine(name: &str) -> Result<Self, String> {
+        let found = MACHINES.iter().find(|machine| machine.name == name);
+        found
+            .map(|machine| Self(machine.limits_mm_s))
+            .ok_or_else(|| {
+                let names: Vec<_> = MACHINES.iter().map(|machine| machine.name).collect();
+                format!("want one of {}", names.join(", "))
+            })
+    }
+
     /// The zone of a velocity, mm/s RMS.
     pub fn zone(&self, mm_s_rms: f64) -> char {
         let above = self.0.iter().filter(|&&limit| mm_s_rms >= limit).count();

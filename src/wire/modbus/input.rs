@@ -211,6 +211,7 @@ pub fn decode_report(register: impl Fn(u16) -> Option<u16>) -> Option<Report> {
         line_time_us_fit: None,
         noise_floor: Default::default(),
         other_px_rms: 0.0,
+        broad_band: None,
     };
     crate::wire::check_report(&report).ok().map(|()| report)
 }

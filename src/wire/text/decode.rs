@@ -171,6 +171,7 @@ fn read_report(mut fields: Fields<'_>) -> Result<Message, DecodeError> {
         line_time_us_fit: None,
         noise_floor: Default::default(),
         other_px_rms: 0.0,
+        broad_band: None,
     };
     let count: u32 = fields.integer("peaks")?;
     for _ in 0..count {

@@ -165,7 +165,9 @@ pub(super) fn run(args: &Args, port: &PortName) -> Result<(), Failure> {
             }
             Event::End => live.set_phase(Phase::Ended, ""),
             Event::Bytes(bytes) => ear.hear(&bytes, |heard| match heard {
-                Heard::Report { report, .. } => live.report(&report, json::report(&report)),
+                Heard::Report { report, .. } => {
+                    live.report(&report, json::zoned(&report, args.machine.as_ref()));
+                }
                 Heard::Reply(reply) => board.heard(reply.ok, &reply.text),
                 Heard::Status(_) => {}
             }),

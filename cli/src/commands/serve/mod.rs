@@ -16,6 +16,7 @@ use rowtone_page::guard::Names;
 use rowtone_page::live::Live;
 use rowtone_page::server::Server;
 use rowtone_page::site::Site;
+use rowtone_report::zone::ZoneLimits;
 use rowtone_serial::port::PortName;
 
 /// How often it is asked whether to end.
@@ -36,6 +37,9 @@ pub struct Args {
     camera: CameraArgs,
     #[command(flatten)]
     window: WindowArgs,
+    /// Kind of machine whose zone after ISO 20816 is shown where there is a scale, as `iso20816-3:group2:flexible`
+    #[arg(long, value_name = "NAME", value_parser = ZoneLimits::of_machine)]
+    machine: Option<ZoneLimits>,
     /// Address and port of the page; 0.0.0.0:7357 shows it to the whole network
     #[arg(long, value_name = "ADDR", default_value = "127.0.0.1:7357")]
     listen: SocketAddr,

@@ -16,6 +16,7 @@ use rowtone_measure::tracking::Shifts;
 use rowtone_page::control::Control;
 use rowtone_page::live::{Live, Phase};
 use rowtone_report::json::{self, Place};
+use rowtone_report::zone::ZoneLimits;
 
 /// Narrowest part that can be measured, px, and the longest window, s.
 const MIN_WIDTH: u16 = 16;
@@ -35,6 +36,8 @@ const KEYS: [Key; 7] = [
 struct Desk {
     options: CameraOptions,
     limits: Limits,
+    /// Where the zones of the kind of machine that was named begin.
+    zones: Option<ZoneLimits>,
     settings: Mutex<Settings>,
     /// Ends what is measured now.
     interrupt: Arc<AtomicBool>,
@@ -179,6 +182,7 @@ fn desk(args: &Args, camera: Option<&Camera>, interrupt: &Arc<AtomicBool>) -> De
             min_width: MIN_WIDTH,
             max_window_s: LONGEST_WINDOW_S,
         },
+        zones: args.machine,
         settings: Mutex::new(settings),
         interrupt: Arc::clone(interrupt),
         again: AtomicBool::new(false),
@@ -215,7 +219,10 @@ fn measure(desk: &Desk, live: &Arc<Live>, feed: Option<Feed>) -> Result<(), Fail
             Event::Frame(_) => progress.step(),
             // What is interrupted by other settings is of no more use.
             Event::Report(report, shapes) if !desk.again.load(Ordering::Acquire) => {
-                shown.report(report, json::measured(report, shapes, place, None));
+                shown.report(
+                    report,
+                    json::measured(report, shapes, place, desk.zones.as_ref()),
+                );
             }
             // The page shows which part was chosen, and warnings with each report.
             Event::Report(..) | Event::Sample(_) | Event::Note(_) => {}

@@ -6,6 +6,7 @@
 //! the thesis's test of a handful of frames, [`days`] many days on end. [`score`] compares the reports with it, [`table`] prints.
 
 pub mod bound;
+pub mod broadband;
 pub mod cameras;
 pub mod days;
 pub mod few;
