@@ -218,7 +218,7 @@ impl Maker {
     }
 
     fn add(&mut self, hz: f64, x: Shape, y: Shape, part: Option<Rect>) {
-        let phase = self.draw.from([0.0, 6.28]);
+        let phase = self.draw.from([0.0, std::f64::consts::TAU]);
         self.recording.config.modes.push(Mode {
             wave: Wave::Tone { hz },
             x,
