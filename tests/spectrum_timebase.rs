@@ -132,6 +132,52 @@ fn a_right_time_base_is_not_doubted() {
     }
 }
 
+/// 160 windows of one strong tone whose amplitude or phase is modulated, whose speed runs up or wanders, or that was struck, with a
+/// steady one beside it: none is flagged.
+#[test]
+fn an_unsteady_tone_does_not_make_a_right_time_base_doubted() {
+    let mut dice = Mmix(78);
+    for seed in 0..160 {
+        let hz = 20.0 * 20_f64.powf(dice.unit());
+        let (rate, depth) = (0.7 * 20_f64.powf(dice.unit()), 0.1 + 0.8 * dice.unit());
+        let (beside, phase) = (20.0 + 500.0 * dice.unit(), TAU * dice.unit());
+        let px = 0.05 + 0.3 * dice.unit();
+        let report = report(2000 + seed, RIGHT, |t, _| {
+            let turn = TAU * hz * t + phase;
+            let slow = TAU * rate * t;
+            let unsteady = match seed % 5 {
+                0 => (1.0 + depth * slow.sin()) * turn.sin(),
+                1 => (turn + depth * slow.sin()).sin(),
+                2 => (turn + TAU * 5.0 * depth * t * t).sin(),
+                3 => (turn + 3.0 * depth * slow.sin()).sin(),
+                _ if t < 0.3 => 0.0,
+                _ => turn.sin() * (-(t - 0.3) / (0.05 + 0.3 * depth)).exp(),
+            };
+            px * unsteady + 0.05 * (TAU * beside * t).sin()
+        });
+        assert!(
+            !flagged(&report),
+            "{seed}: {hz} Hz, {rate} Hz, {depth}: {report:?}"
+        );
+    }
+}
+
+/// Three tones of one machine at half and a quarter of the line time: the strong one then looks modulated.
+#[test]
+fn a_line_time_of_a_half_under_harmonics_is_flagged() {
+    let harmonics = |t: f64, _: f64| {
+        let tone = |n: f64, hz: f64, px: f64| px * (TAU * hz * t + 0.7 * n).sin();
+        tone(0.0, 49.2, 0.4) + tone(1.0, 98.4, 0.1) + tone(2.0, 296.7, 0.02)
+    };
+    for line in [0.25, 0.33, 0.5] {
+        for seed in 0..3 {
+            let said = Said { line, ..RIGHT };
+            let report = report(seed, said, harmonics);
+            assert!(flagged(&report), "{line}: {report:?}");
+        }
+    }
+}
+
 /// A wrong one is flagged, and the right line time is given where one value fits.
 #[test]
 fn a_wrong_time_base_is_flagged() {

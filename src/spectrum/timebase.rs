@@ -30,6 +30,10 @@ const SHARE: f32 = 0.0025;
 /// and by so much that the phase has turned by this over the rows, rad: real shapes turn it a little.
 const TURN: f32 = 0.03;
 
+/// A tone that is modulated is told wrong only by so many times that: its sidebands turn the phase too, and a wrong
+/// line time looks like modulation.
+const MODULATED: f32 = 4.0;
+
 /// A tone of which more chi² for each degree of freedom is left tells nothing.
 const MISFIT: f32 = 30.0;
 
@@ -123,7 +127,7 @@ impl Look<'_> {
                 let taken = strong.iter().any(|&j| self.alike(samples, i, j));
                 let power = power(i);
                 let more = best.is_none_or(|(_, p)| power > p);
-                let steady = !tone.modulated && !self.has_beside(samples, i);
+                let steady = tone.modulated || !self.has_beside(samples, i);
                 if !taken && steady && power > STRONG && more {
                     best = Some((i, power));
                 }
@@ -167,13 +171,17 @@ impl Look<'_> {
         let Some((within_hz, sd_hz)) = around.top(samples, here, self.variance) else {
             return false;
         };
-        (within_hz - here).abs() < self.tolerance_hz(within_hz, sd_hz, readout_s)
+        (within_hz - here).abs() < self.tolerance_hz(i, within_hz, sd_hz, readout_s)
     }
 
-    fn tolerance_hz(&self, within_hz: f32, sd_hz: f32, readout_s: f32) -> f32 {
-        (DEVIATIONS * sd_hz)
-            .max(SHARE * within_hz.abs())
-            .max(TURN / (core::f32::consts::TAU * readout_s))
+    fn tolerance_hz(&self, i: usize, within_hz: f32, sd_hz: f32, readout_s: f32) -> f32 {
+        let unsteady = if self.model.tones[i].modulated {
+            MODULATED
+        } else {
+            1.0
+        };
+        let least = (SHARE * within_hz.abs()).max(TURN / (core::f32::consts::TAU * readout_s));
+        (DEVIATIONS * sd_hz).max(unsteady * least)
     }
 
     /// The frequency within frames of what is at the alias frequency of tone `i`, of all that there are.
@@ -242,7 +250,7 @@ impl Look<'_> {
             frequency: self.model.tones[i].frequency,
             within_hz,
             sd_hz,
-            tolerance_hz: self.tolerance_hz(within_hz, sd_hz, readout_s),
+            tolerance_hz: self.tolerance_hz(i, within_hz, sd_hz, readout_s),
         })
     }
 
