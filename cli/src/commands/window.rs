@@ -4,6 +4,9 @@ use crate::failure::Failure;
 use rowtone::report::MAX_PEAKS;
 use rowtone_measure::analysis::Settings;
 
+/// Windows follow each other no faster, s.
+const LEAST_HOP_S: f64 = 0.001;
+
 /// What is looked for, and in how long a window.
 #[derive(Clone, Debug, clap::Args)]
 pub struct WindowArgs {
@@ -34,8 +37,17 @@ impl WindowArgs {
     /// What can be checked without the input.
     ///
     /// # Errors
-    /// [`Failure::Usage`] where the lowest frequency is not below the highest.
+    /// [`Failure::Usage`] where the lowest frequency is not below the highest, or windows follow each other too fast.
     pub fn check(&self) -> Result<(), Failure> {
+        if self.hop_s() < LEAST_HOP_S {
+            let (option, value, least) = match self.hop {
+                Some(hop) => ("--hop", hop, LEAST_HOP_S),
+                None => ("--window", self.window, 2.0 * LEAST_HOP_S),
+            };
+            return Err(Failure::usage(format!(
+                "{option} {value} is too short: give {least} s or more"
+            )));
+        }
         if let (Some(min), Some(max)) = (self.min_hz, self.max_hz)
             && min >= max
         {

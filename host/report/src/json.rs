@@ -247,7 +247,83 @@ fn to_string(
 mod tests {
     use super::Place;
     use crate::example;
-    use rowtone::report::{FloorPoint, Motion, PeakShape, ShapeRow};
+    use rowtone::report::{FloorPoint, Modulation, Motion, PeakShape, ShapeRow, Warning};
+
+    const PAGE: &str = include_str!("../../../docs/json.md");
+
+    #[test]
+    fn the_page_names_every_warning_with_its_bit() {
+        let (_, table) = PAGE.split_once("## Warnings").unwrap();
+        for (bit, warning) in Warning::ALL.into_iter().enumerate() {
+            let word = format!("`{}`", warning.name());
+            let row = table.lines().find(|line| {
+                line.starts_with("| `")
+                    && line.split(" | ").next().is_some_and(|c| c.contains(&word))
+            });
+            let bits = row.and_then(|row| row.split(" | ").nth(1)).unwrap_or("");
+            assert!(
+                bits.split(", ").any(|b| b == bit.to_string()),
+                "{word} has no row with bit {bit}: {row:?}"
+            );
+        }
+    }
+
+    /// Every key of an object and of those within it.
+    fn keys(value: &serde_json::Value, found: &mut Vec<String>) {
+        match value {
+            serde_json::Value::Object(fields) => {
+                for (key, value) in fields {
+                    found.push(key.clone());
+                    keys(value, found);
+                }
+            }
+            serde_json::Value::Array(values) => values.iter().for_each(|v| keys(v, found)),
+            _ => {}
+        }
+    }
+
+    #[test]
+    fn the_page_names_every_key() {
+        let mut report = example(Some(100.0));
+        report.noise_floor.push(FloorPoint::default()).unwrap();
+        report.peaks[0].motion = Some(Motion {
+            x_px: Some(0.3),
+            x_px_sd: Some(0.001),
+            y_px: Some(0.1),
+            y_px_sd: Some(0.001),
+            phase_rad: 0.3,
+            y_phase_rad: Some(0.2),
+            across_rad: Some(0.1),
+            rigid: false,
+            decay_s: Some(0.1),
+            hz_per_s: Some(2.0),
+            modulation: Some(Modulation {
+                hz: 3.0,
+                depth: 0.2,
+                of_phase: false,
+            }),
+            spread_hz: Some(0.4),
+        });
+        report.peaks[0].harmonic = Some(1);
+        let place = Place {
+            roi: [0; 4],
+            axes: "xy",
+        };
+        let shape = PeakShape {
+            hz: report.peaks[0].hz,
+            rows: [ShapeRow::default()].into_iter().collect(),
+        };
+        let json = super::measured(&report, &[shape], place, None);
+        let mut found = Vec::new();
+        keys(&serde_json::from_str(&json).unwrap(), &mut found);
+        assert!(found.len() > 30, "{found:?}");
+        for key in found {
+            assert!(
+                PAGE.contains(&format!("`{key}`")),
+                "{key} is not on the page"
+            );
+        }
+    }
 
     #[test]
     fn the_keys_are_the_contract() {

@@ -58,7 +58,7 @@ pub fn examine(config: &Config, camera: Result<Box<dyn Source>, CameraError>) ->
 
 fn port(config: &Config, findings: &mut Findings) {
     let port = &config.output.port;
-    if port == "-" {
+    if port == "-" || port == crate::uart::TEXT {
         return findings.ok("output: standard output");
     }
     match OpenOptions::new().read(true).write(true).open(port) {
@@ -216,6 +216,22 @@ mod tests {
             found.text
         );
         assert!(found.text.contains("60 of 60 rows"), "{}", found.text);
+    }
+
+    #[test]
+    fn lines_for_people_need_no_serial_port() {
+        let config = format!("[output]\nport = \"{}\"", crate::uart::TEXT);
+        let missing = CameraError::Missing {
+            wanted: None,
+            found: Vec::new(),
+        };
+        let found = findings(&config, Err(missing));
+        let first = found.text.lines().next();
+        assert!(
+            first.is_some_and(|line| line.contains("ok") && line.contains("standard output")),
+            "{}",
+            found.text
+        );
     }
 
     #[test]
