@@ -10,7 +10,7 @@
 //! texture of no preferred direction answers to both shifts as if it were weakened by 1 − (b_x·x² + b_y·y²), b = curvature/6, along either axis (an isotropic spectrum's fourth moments: ⟨k_x⁴⟩ = 3⟨k_x²·k_y²⟩).
 
 use super::{
-    Bins, Place, Rejected, Tracker,
+    Bins, Place, Rejected, Stage, Tracker,
     correlate::whole_sums,
     overlap::{Overlap, nearest_step},
     predict::Prediction,
@@ -46,10 +46,8 @@ const SMALL_PX: f32 = 0.4;
 const SOUGHT_STEPS: usize = 4;
 const SOUGHT: usize = 2 * SOUGHT_STEPS + 1;
 const SEEKING_ROWS: u8 = 3;
-/// A row that looks for it knows its place to a fifth of a pixel, 1/px², and leaves less than this share of the mean where
-/// it is found: else it fits anywhere.
+/// In the second round of learning, what a row knows of its place that looks for it, 1/px²: a fifth of a pixel.
 const SEEKING_INFORMATION: f32 = 25.0;
-const SURELY_LESS: f32 = 0.8;
 /// Columns that are compared then.
 const SOUGHT_COLUMNS: usize = 48;
 
@@ -220,7 +218,7 @@ impl Tracker<'_> {
     /// The row of the reference that a line is read against, after it was looked for where that is needed; `None` where it is
     /// not in the picture. Along the rows alone, it is the line's own.
     pub(super) fn reference_row<P: Pixel>(&mut self, row: usize, pixels: &[P]) -> Option<usize> {
-        if self.planar.seeking > 0 && self.tells_of_down(row) {
+        if self.planar.seeking > 0 && self.may_seek(row) {
             self.seek(row, pixels);
         }
         let planar = &mut self.planar;
@@ -230,11 +228,11 @@ impl Tracker<'_> {
         planar.read_row
     }
 
-    /// The row knows enough of its place along the columns to look for the picture by it: a blank one fits anywhere, and
-    /// would lead those below it astray.
-    fn tells_of_down(&self, row: usize) -> bool {
+    /// The picture may be looked for by this row. In the second round of learning it must know its place along the columns:
+    /// what a row finds that fits anywhere would be learned, and all later frames be measured against it.
+    fn may_seek(&self, row: usize) -> bool {
         let knows = |t: &VerticalTable| t.information_per_px2() > SEEKING_INFORMATION;
-        self.store.vertical_table(row).is_some_and(knows)
+        self.stage != Stage::Refining || self.store.vertical_table(row).is_some_and(knows)
     }
 
     /// Looks for a picture that moves by whole rows.
@@ -268,10 +266,7 @@ impl Tracker<'_> {
         let least = (-(SOUGHT_STEPS as i32)..)
             .zip(sought)
             .min_by(|a, b| a.1.total_cmp(&b.1));
-        let usual = sought.iter().sum::<f32>() / SOUGHT as f32;
-        if let Some((steps, left)) = least
-            && left < SURELY_LESS * usual
-        {
+        if let Some((steps, left)) = least {
             let here = left >= middle;
             planar.whole = if here { 0 } else { steps * stride };
             (planar.down_px, planar.near_px, planar.information) = (0.0, 0.0, 0.0);
