@@ -77,8 +77,8 @@ pub struct Report {
     /// part of the floor. 0 where the floor is white. Wires of version 1 do not carry it.
     #[serde(skip)]
     pub other_px_rms: f32,
-    /// Broad-band measures; `None` where a window is too short or its samples lie too far apart. Wires of version 1 do not carry
-    /// them.
+    /// Broad-band measures; `None` where they were not asked for, a window is too short or its samples
+    /// lie too far apart. Wires of version 1 do not carry them.
     #[serde(skip)]
     pub broad_band: Option<BroadBand>,
 }

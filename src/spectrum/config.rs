@@ -31,6 +31,8 @@ pub struct Config {
     pub max_passes: u32,
     /// Scale of the picture, µm a pixel.
     pub um_per_px: Option<f32>,
+    /// Broad-band measures are made: a fifth more of a microcontroller's time a window. Default true.
+    pub broad_band: bool,
 }
 
 impl Default for Config {
@@ -44,6 +46,7 @@ impl Default for Config {
             false_alarm: 1e-3,
             max_passes: 1000,
             um_per_px: None,
+            broad_band: true,
         }
     }
 }

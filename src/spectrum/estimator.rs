@@ -191,6 +191,9 @@ impl<'a> Estimator<'a> {
             work.shapes,
         );
         tones.more |= outcome.more;
+        if !self.config.broad_band {
+            return tones;
+        }
         let (grid, noise) = residual.into_parts();
         let given = Given {
             group: &self.group,

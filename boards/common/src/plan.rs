@@ -61,6 +61,8 @@ impl Plan {
 pub fn spectrum_config(settings: &Settings) -> spectrum::Config {
     spectrum::Config {
         max_passes: MAX_PASSES,
+        // All that the wires of version 1 carry of these is the velocity, where there is a scale.
+        broad_band: settings.um_per_px.is_some(),
         ..settings.spectrum()
     }
 }

@@ -75,6 +75,8 @@ fn run(args: &Args, uart: &mut Uart) -> Result<(), Failure> {
         window_ns,
         hop_ns: window_ns / 2,
         max_passes: rowtone_board::memory::MAX_PASSES,
+        // As a board without a scale: none of its wires would carry them.
+        broad_band: false,
         ..spectrum::Config::default()
     };
     let mut board = Board {
