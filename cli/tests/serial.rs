@@ -146,9 +146,10 @@ fn a_stuck_port_does_not_hold_up_a_live_measurement() {
         .spawn()
         .unwrap();
     let mut stdin = child.stdin.take().unwrap();
-    stdin.write_all(&bytes).unwrap();
-    drop(stdin);
+    // Beside the reading: the reports are more than a pipe holds.
+    let filming = std::thread::spawn(move || stdin.write_all(&bytes));
     let output = child.wait_with_output().unwrap();
+    filming.join().unwrap().unwrap();
     let (stdout, stderr) = texts(&output);
     assert_failure(&output, 1, &[&name, "stuck", "dropped", "left"]);
     let printed = reports(&stdout);

@@ -74,9 +74,15 @@ pub(crate) fn piped<S: AsRef<std::ffi::OsStr>>(
         .stderr(Stdio::piped())
         .spawn()
         .expect("the command starts");
-    // A command that has seen enough stops reading.
-    let _ = child.stdin.take().expect("a pipe").write_all(input);
-    child.wait_with_output().expect("the command ends")
+    let mut stdin = child.stdin.take().expect("a pipe");
+    std::thread::scope(|scope| {
+        // Beside the reading: the command may say more than a pipe holds before it has read all. One
+        // that has seen enough stops reading.
+        scope.spawn(move || {
+            let _ = stdin.write_all(input);
+        });
+        child.wait_with_output().expect("the command ends")
+    })
 }
 
 /// Standard output and error as text.
