@@ -78,6 +78,8 @@ pub(crate) struct Look<'a> {
     pub(crate) variance: f32,
     pub(crate) fps: f32,
     pub(crate) highest_hz: f32,
+    /// Some tone is told: only then are modulated ones, which may be a wander, asked too.
+    pub(crate) is_told: bool,
 }
 
 impl Look<'_> {
@@ -127,7 +129,11 @@ impl Look<'_> {
                 let taken = strong.iter().any(|&j| self.alike(samples, i, j));
                 let power = power(i);
                 let more = best.is_none_or(|(_, p)| power > p);
-                let steady = tone.modulated || !self.has_beside(samples, i);
+                let steady = if tone.modulated {
+                    self.is_told
+                } else {
+                    !self.has_beside(samples, i)
+                };
                 if !taken && steady && power > STRONG && more {
                     best = Some((i, power));
                 }

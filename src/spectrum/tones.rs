@@ -164,7 +164,8 @@ impl Telling<'_> {
             );
         }
         let unexplained = plain.squares / Fit::freedom(samples, plain).max(1.0);
-        self.check_time_base(samples, fit, (plain, unexplained), &mut tones);
+        let is_told = !list.is_empty();
+        self.check_time_base(samples, fit, (plain, unexplained, is_told), &mut tones);
         largest_first(&mut list);
         name_modulations(&mut list, samples.length_s);
         name_groups(&mut list, samples.length_s);
@@ -191,7 +192,7 @@ impl Telling<'_> {
         &self,
         samples: &mut Samples<'_>,
         fit: &mut Fit,
-        (model, variance): (&Model, f32),
+        (model, variance, is_told): (&Model, f32, bool),
         tones: &mut Tones,
     ) {
         let Some(fps) = self.band.fps else { return };
@@ -206,6 +207,7 @@ impl Telling<'_> {
             variance,
             fps,
             highest_hz: self.band.highest_hz,
+            is_told,
         };
         let base = look.check(samples, fit);
         let line_us = self.group.timing().line_time_ps() as f32 * 1e-6;
