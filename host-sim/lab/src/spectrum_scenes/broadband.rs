@@ -40,7 +40,7 @@ impl Kind {
     }
 }
 
-/// Measures that are compared, in the order of [`of`].
+/// Measures that are compared, in the order of the figures of a window.
 pub const MEASURES: [&str; 6] = [
     "velocity",
     "velocity 2 Hz",
