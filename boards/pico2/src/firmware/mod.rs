@@ -53,7 +53,7 @@ static UART_IN: ConstStaticCell<[u8; 256]> = ConstStaticCell::new([0; 256]);
 
 /// A window and the serial line's interrupt on top of it (`boards/ci.sh` adds up how deep they go); the guard
 /// below it traps what is beyond.
-static CORE1_STACK: ConstStaticCell<Stack<{ 40 * 1024 }>> = ConstStaticCell::new(Stack::new());
+static CORE1_STACK: ConstStaticCell<Stack<{ 44 * 1024 }>> = ConstStaticCell::new(Stack::new());
 static CORE0: StaticCell<Executor> = StaticCell::new();
 static CORE1: StaticCell<Executor> = StaticCell::new();
 static CORE0_URGENT: InterruptExecutor = InterruptExecutor::new();
