@@ -83,28 +83,12 @@ pub const MACHINES: [Kind; 15] = [
     }),
     kind("upper and lower half, two tones", |m| {
         for y in [0, 120] {
-            let hz = m.hz();
-            let half = Rect {
-                x: 0,
-                y,
-                w: 192,
-                h: 120,
-            };
-            m.add(hz, Shape::even(0.2), Shape::default(), Some(half));
-            m.recording.tones.push(Truth { hz, px: Some(0.2) });
+            m.part([0, y, 192, 120], Some(0.2));
         }
     }),
     kind("left and right half, two tones", |m| {
         for x in [0, 96] {
-            let hz = m.hz();
-            let half = Rect {
-                x,
-                y: 0,
-                w: 96,
-                h: 240,
-            };
-            m.add(hz, Shape::even(0.2), Shape::default(), Some(half));
-            m.recording.tones.push(Truth { hz, px: None });
+            m.part([x, 0, 96, 240], None);
         }
     }),
     kind("machine on a photograph: bends, moves both ways", |m| {
@@ -233,6 +217,14 @@ impl Maker {
         let hz = self.hz();
         self.add(hz, Shape::even(x), Shape::even(y), None);
         let px = Some(x.hypot(y));
+        self.recording.tones.push(Truth { hz, px });
+    }
+
+    /// A part that moves along the rows by 0.2 px at a tone of its own, and what is known of its amplitude.
+    fn part(&mut self, [x, y, w, h]: [u32; 4], px: Option<f64>) {
+        let hz = self.hz();
+        let part = Some(Rect { x, y, w, h });
+        self.add(hz, Shape::even(0.2), Shape::default(), part);
         self.recording.tones.push(Truth { hz, px });
     }
 

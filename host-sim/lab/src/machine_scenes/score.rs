@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use host_sim::Camera;
-use rowtone::report::Report;
+use rowtone::report::{Peak, Report};
 use rowtone::tracker::Axes;
 use rowtone_measure::analysis::{Analysis, Event, Plan, Settings};
 use rowtone_measure::tracking::Shifts;
@@ -66,19 +66,14 @@ impl Score {
         self.warnings.extend(report.warnings.names());
         let mut invented = false;
         for peak in &report.peaks {
-            let hz = f64::from(peak.hz);
-            let is = |tone: &&Truth| (tone.hz - hz).abs() < SAME_HZ;
-            if tones.iter().any(|tone| is(&tone)) || peak.ambiguous {
+            if tones.iter().any(|tone| tone.is(peak)) || peak.ambiguous {
                 continue;
             }
-            let px = f64::from(peak.amplitude_px);
+            let (hz, px) = (f64::from(peak.hz), f64::from(peak.amplitude_px));
             match tones.iter().find(|tone| is_image(tone.hz, hz, fps)) {
                 Some(tone) => {
-                    let own = report
-                        .peaks
-                        .iter()
-                        .find(|p| (f64::from(p.hz) - tone.hz).abs() < SAME_HZ);
-                    let own_px = own.map_or(0.0, |p| f64::from(p.amplitude_px));
+                    let own = report.peaks.iter().find(|peak| tone.is(peak));
+                    let own_px = own.map_or(0.0, |peak| f64::from(peak.amplitude_px));
                     self.image = self.image.max(px / own_px.max(px));
                 }
                 None => invented = true,
@@ -87,11 +82,9 @@ impl Score {
         self.false_windows += u32::from(invented);
         for tone in tones {
             self.due += 1;
-            let near = report
-                .peaks
-                .iter()
-                .find(|peak| (f64::from(peak.hz) - tone.hz).abs() < SAME_HZ);
-            let Some(peak) = near else { continue };
+            let Some(peak) = report.peaks.iter().find(|peak| tone.is(peak)) else {
+                continue;
+            };
             match peak.ambiguous {
                 true => self.ambiguous += 1,
                 false => self.sure += 1,
@@ -102,6 +95,13 @@ impl Score {
                 self.amplitude.push(f64::from(peak.amplitude_px) / px - 1.0);
             }
         }
+    }
+}
+
+impl Truth {
+    /// A peak is this tone.
+    fn is(&self, peak: &Peak) -> bool {
+        (f64::from(peak.hz) - self.hz).abs() < SAME_HZ
     }
 }
 
