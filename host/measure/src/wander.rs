@@ -15,6 +15,24 @@ const PIECES: usize = 8;
 const LEAST_PX: f32 = 0.15;
 /// Times the largest tone's amplitude.
 const TIMES: f32 = 1.5;
+/// A machine that vibrates by more than so many times what its camera shakes by leaves nothing to warn
+/// of; a motion along the columns of which the rows see a little everywhere looks like such a shake.
+const MUCH_MORE: f32 = 4.0;
+
+/// Whether a camera that shakes by `shake_px` is to be told where the largest tone of the report has
+/// `largest_px`.
+pub(crate) fn is_told(shake_px: f32, largest_px: f32) -> bool {
+    largest_px < MUCH_MORE * shake_px
+}
+
+/// The largest amplitude of the report's tones, px; 0 where there is none.
+pub(crate) fn largest_px(report: &Report) -> f32 {
+    report
+        .peaks
+        .iter()
+        .map(|p| p.amplitude_px)
+        .fold(0.0, f32::max)
+}
 
 /// Where the picture was on average in the frames of a window.
 #[derive(Clone, Debug)]
@@ -49,8 +67,7 @@ impl Wander {
 
     /// The picture wanders by more than the tones of the report, and what they may leave in pieces of a window.
     pub(crate) fn exceeds(&self, report: &Report) -> bool {
-        let largest = report.peaks.iter().map(|p| p.amplitude_px);
-        let largest = largest.fold(0.0, f32::max);
+        let largest = largest_px(report);
         self.half_span_px()
             .is_some_and(|px| px > LEAST_PX.max(TIMES * largest))
     }
@@ -103,6 +120,14 @@ mod tests {
             );
         }
         wander
+    }
+
+    #[test]
+    fn a_shake_is_told_unless_the_machine_does_much_more() {
+        assert!(is_told(0.001, 0.0));
+        assert!(is_told(0.3, 0.31));
+        // What the rows see of 0.2 px along the columns.
+        assert!(!is_told(0.001, 0.2));
     }
 
     #[test]

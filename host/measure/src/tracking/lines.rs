@@ -73,7 +73,7 @@ fn measure_all(
     let region = choice.region;
     lines.chosen = Some(Chosen {
         part: as_given(&region, &feed.camera),
-        camera_moves: choice.camera_moves,
+        shake_px: choice.shake_px,
         keyed: false,
     });
     let mut notes = std::mem::take(&mut feed.notes);
@@ -301,7 +301,7 @@ impl<'a> Lines<'a> {
             self.learn_roughly(first);
             return Choice {
                 region: Region::whole(part),
-                camera_moves: false,
+                shake_px: None,
             };
         }
         thread::scope(|scope| {

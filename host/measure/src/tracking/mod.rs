@@ -54,12 +54,13 @@ pub struct FrameShifts {
 }
 
 /// What is measured of the picture, and what was seen on the way to it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Chosen {
     /// The part, in the picture as it was given.
     pub part: Rect,
-    /// All of the picture shakes by more than a part of it vibrates.
-    pub camera_moves: bool,
+    /// By how much all of the picture shakes along the rows, zero to peak, px, where that is more than
+    /// a part of it vibrates.
+    pub shake_px: Option<f64>,
     /// A codec took something of the frames between key frames, which the end of a file tells.
     pub keyed: bool,
 }

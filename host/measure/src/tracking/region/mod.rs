@@ -49,12 +49,13 @@ impl Region {
 }
 
 /// What the first frames say of the picture.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Choice {
     /// The part to measure.
     pub region: Region,
-    /// All of the picture shakes by more than a part of it vibrates.
-    pub camera_moves: bool,
+    /// By how much all of the picture shakes along the rows, zero to peak, px, where that is more than
+    /// a part of it vibrates.
+    pub shake_px: Option<f64>,
 }
 
 /// A frame, as far as it is needed here.
@@ -80,7 +81,7 @@ impl Picture for Frame {
 pub fn choose<P: Picture>(frames: &[P], part: &Rect, timing: &Timing) -> Choice {
     let whole = Choice {
         region: Region::whole(part),
-        camera_moves: false,
+        shake_px: None,
     };
     if frames.len() < LEAST_FRAMES {
         return whole;
@@ -108,7 +109,9 @@ pub fn choose<P: Picture>(frames: &[P], part: &Rect, timing: &Timing) -> Choice 
         known.push(tone);
         all.push(tones::take_out(&mut shifts, tone.hz, &bands));
     }
-    let camera_moves = is_regular(&shifts.starts_s) && rectangle::camera_moves(&all, across, down);
+    let shake_px = is_regular(&shifts.starts_s)
+        .then(|| rectangle::shake_px(&all, across, down))
+        .flatten();
     let vibrates = |tone: &Tone| tone.hz * shifts.span_s() >= PERIODS;
     let decisive = &known[..tones.len()];
     if decisive.iter().any(vibrates) {
@@ -116,10 +119,7 @@ pub fn choose<P: Picture>(frames: &[P], part: &Rect, timing: &Timing) -> Choice 
         tones.retain(|_| decisive.next().is_some_and(vibrates));
     }
     let Some(found) = rectangle::best_of_motions(tones, across, down) else {
-        return Choice {
-            camera_moves,
-            ..whole
-        };
+        return Choice { shake_px, ..whole };
     };
     let span = |pieces: &[Range<usize>], found: &Range<usize>| {
         pieces[found.start].start..pieces[found.end - 1].end
@@ -133,7 +133,7 @@ pub fn choose<P: Picture>(frames: &[P], part: &Rect, timing: &Timing) -> Choice 
             columns: part.x + columns.start..part.x + columns.end,
             rows: part.y + rows.start..part.y + rows.end,
         },
-        camera_moves,
+        shake_px,
     }
 }
 
@@ -260,6 +260,6 @@ mod tests {
         let timing = Timing::new(90_000_000, 800_000, SIZE.1 as u16).unwrap();
         let choice = choose(&moving_down(), &part, &timing);
         assert_eq!(choice.region, Region::whole(&part));
-        assert!(!choice.camera_moves);
+        assert_eq!(choice.shake_px, None);
     }
 }

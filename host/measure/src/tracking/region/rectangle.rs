@@ -131,11 +131,10 @@ pub(super) fn best_of_motions(
     }
 }
 
-/// The camera moves: the first tone, the largest, is in all tiles alike, and another one in a part of them alone.
-pub(super) fn camera_moves(tones: &[Vec<Tile>], columns: usize, rows: usize) -> bool {
-    let Some((shake, others)) = tones.split_first() else {
-        return false;
-    };
+/// The amplitude of a camera that moves, px: the first tone, the largest, is in all tiles alike, and
+/// another one in a part of them alone.
+pub(super) fn shake_px(tones: &[Vec<Tile>], columns: usize, rows: usize) -> Option<f64> {
+    let (shake, others) = tones.split_first()?;
     let whole = Rectangle {
         columns: 0..columns,
         rows: 0..rows,
@@ -149,14 +148,16 @@ pub(super) fn camera_moves(tones: &[Vec<Tile>], columns: usize, rows: usize) -> 
         }
         all.amplitude().map_or(0.0, |[c, s]| c.hypot(s))
     };
-    unlikeness(shake, columns, &whole) < ALIKE
-        && others.iter().any(|tone| {
-            let part = best_of_motions(vec![tone.clone()], columns, rows);
-            part.is_some_and(|part| {
-                let share = amplitude(tone, &part) / amplitude(shake, &whole);
-                (LEAST_SHARE..1.0).contains(&share)
-            })
+    let shake_px = amplitude(shake, &whole);
+    let in_a_part = |tone: &Vec<Tile>| {
+        let part = best_of_motions(vec![tone.clone()], columns, rows);
+        part.is_some_and(|part| {
+            let share = amplitude(tone, &part) / shake_px;
+            (LEAST_SHARE..1.0).contains(&share)
         })
+    };
+    let shakes = unlikeness(shake, columns, &whole) < ALIKE && others.iter().any(in_a_part);
+    shakes.then_some(shake_px)
 }
 
 /// Columns and rows, in tiles.
@@ -393,12 +394,13 @@ mod tests {
                 move |x, _| if is_left(x) { [0.0, px] } else { [0.0; 2] },
             )
         };
-        assert!(camera_moves(&[shake.clone(), machine(0.05)], COLUMNS, ROWS));
-        assert!(!camera_moves(std::slice::from_ref(&shake), COLUMNS, ROWS));
+        let moves = shake_px(&[shake.clone(), machine(0.05)], COLUMNS, ROWS).unwrap();
+        assert!((moves - 0.3f64.hypot(0.1)).abs() < 0.01, "{moves} px");
+        assert_eq!(shake_px(std::slice::from_ref(&shake), COLUMNS, ROWS), None);
         // All of the machine is in the picture.
         let all = tiles(0.01, |_, _| [0.0, 0.05]);
-        assert!(!camera_moves(&[shake.clone(), all], COLUMNS, ROWS));
-        assert!(!camera_moves(&[machine(0.3), shake], COLUMNS, ROWS));
+        assert_eq!(shake_px(&[shake.clone(), all], COLUMNS, ROWS), None);
+        assert_eq!(shake_px(&[machine(0.3), shake], COLUMNS, ROWS), None);
     }
 
     #[test]
