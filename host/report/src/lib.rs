@@ -5,6 +5,7 @@ mod broad;
 mod example;
 pub mod json;
 pub mod machine;
+mod motion;
 pub mod text;
 pub mod zone;
 

@@ -6,7 +6,7 @@ use rowtone::report::{Peak, Report};
 
 use super::broad::{self, velocity_mm_s};
 use super::zone::ZoneLimits;
-use super::{band_velocity, sentence, velocity_mm_s_rms};
+use super::{band_velocity, motion, sentence, velocity_mm_s_rms};
 
 /// A report as a heading and one line a peak, without the last line feed.
 pub fn report(report: &Report) -> String {
@@ -69,8 +69,12 @@ fn peak_line(peak: &Peak, um_per_px: Option<f32>) -> String {
     if let Some(harmonic) = peak.harmonic {
         let _ = write!(line, "  {harmonic}x");
     }
+    let motion = motion::words(peak);
+    if !motion.is_empty() {
+        let _ = write!(line, "  {motion}");
+    }
     if peak.ambiguous {
-        line.push_str("  ambiguous: near a multiple of the frame rate");
+        line.push_str("  ambiguous: may be another frequency");
     }
     line
 }
