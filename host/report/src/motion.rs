@@ -139,7 +139,7 @@ mod tests {
         let across = Motion {
             x_px: None,
             y_px: None,
-            across_rad: Some(-0.5236),
+            across_rad: Some(-core::f32::consts::FRAC_PI_6),
             ..moving(0.0, 0.0, 0.0)
         };
         assert_eq!(said(across), "across its edges, at -30°");
