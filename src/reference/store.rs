@@ -60,6 +60,11 @@ impl<'a> Store<'a> {
         self.recipe.noise = noise;
     }
 
+    /// From now on a pixel of the reference is saturated from this value on.
+    pub(crate) fn set_saturation(&mut self, saturation: f32) {
+        self.recipe.saturation = saturation;
+    }
+
     /// From now on the motion may carry so many columns out of the picture.
     pub(crate) fn set_margin_px(&mut self, margin_px: usize) {
         self.recipe.margin_px = margin_px;

@@ -112,6 +112,16 @@ impl fmt::Display for ConfigError {
 impl core::error::Error for ConfigError {}
 
 impl Config {
+    /// Pixel values: 2 to the power of `bits`.
+    pub(super) fn values(&self) -> f32 {
+        f32::from(1u16 << (self.bits - 1)) * 2.0
+    }
+
+    /// Pixel value from which on a pixel is saturated.
+    pub(super) fn saturation(&self) -> f32 {
+        self.values() * (254.0 / 256.0)
+    }
+
     /// Checks the configuration and cuts the buffers to the sizes that it needs.
     pub(super) fn check<'a>(&self, storage: Storage<'a>) -> Result<Storage<'a>, ConfigError> {
         if !(16..=8192).contains(&self.width) {

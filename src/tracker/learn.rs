@@ -43,7 +43,7 @@ impl Tracker<'_> {
         self.frames_in_stage = 0;
         self.vetting = Vetting::default();
         self.range_px = f32::INFINITY;
-        self.light.to_reference = 1.0;
+        self.light.relearn();
         self.prediction = Prediction::default();
         self.curvature = Curvature::default();
         self.correlator = Correlator::learning(self.config.stride);
@@ -53,6 +53,7 @@ impl Tracker<'_> {
         self.paths.relearn();
         self.meter = NoiseMeter::default();
         self.check = Check::new(super::search::starts(&self.config));
+        self.store.set_saturation(self.config.saturation());
         self.store.forget(
             PixelNoise::guess(values),
             self.config.level.unwrap_or(Level::Medium),
@@ -83,6 +84,9 @@ impl Tracker<'_> {
             }
             Stage::Refining => {
                 self.settle_noise();
+                // What is cut off in a lamp's bright moments does not follow the light: it would be a motion.
+                let share = self.light.unsaturated_share();
+                self.store.set_saturation(share * self.config.saturation());
                 self.store.leave_out_still_pixels();
                 self.settle_margin();
                 self.store.even_light();
@@ -177,6 +181,9 @@ impl Tracker<'_> {
         let place_px = [shift_px, down_px];
         self.store
             .average(row, pixels, place_px, self.light.to_reference, u16::MAX);
+        if self.stage == Stage::Refining && textured {
+            self.light.note_learned();
+        }
         if seen.frames == WATCH_AFTER {
             self.store.watch_row(row);
         }

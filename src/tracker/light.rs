@@ -12,12 +12,18 @@ pub(super) struct Light {
     slope: f32,
     /// Weight of the newest row in that.
     share: f32,
+    /// The factor of the brightest rows while learning: how far the light rises above the reference's.
+    brightest: f32,
     /// No row of this frame was taken yet.
     fresh: bool,
     lateness: Lateness,
 }
 
 impl Light {
+    /// Light that rises by less than this over the reference's does not.
+    const STEADY: f32 = 0.97;
+    /// Light that rises higher than this was a flash, and is not expected again.
+    const FLASH: f32 = 0.4;
     /// Weight of the newest row, once there are enough.
     const SHARE: f32 = 0.25;
 
@@ -26,8 +32,31 @@ impl Light {
             to_reference: 1.0,
             slope: 0.0,
             share: 1.0,
+            brightest: 1.0,
             fresh: true,
             lateness: Lateness::new(timing),
+        }
+    }
+
+    /// Forgets the light.
+    pub(super) fn relearn(&mut self) {
+        (self.to_reference, self.brightest) = (1.0, 1.0);
+    }
+
+    /// A row is learned in the light of the last line. (A row in four makes the difference, so that noise does not.)
+    pub(super) fn note_learned(&mut self) {
+        let brighter = (self.to_reference - self.brightest).min(0.0);
+        if self.to_reference > Self::FLASH {
+            self.brightest += 0.25 * brighter;
+        }
+    }
+
+    /// The share of a saturated pixel's value from which on a pixel of the reference is saturated in the brightest
+    /// light, 0.4 to 1.
+    pub(super) fn unsaturated_share(&self) -> f32 {
+        match self.brightest < Self::STEADY {
+            true => self.brightest,
+            false => 1.0,
         }
     }
 

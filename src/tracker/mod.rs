@@ -135,14 +135,14 @@ impl<'a> Tracker<'a> {
         if config.columns_per_line != u16::MAX {
             config.kernel = config.kernel.with_half_the_light();
         }
-        let values = f32::from(1u16 << (config.bits - 1)) * 2.0;
+        let values = config.values();
         let recipe = Recipe {
             level: config.level.unwrap_or(Level::Medium),
             stride: usize::from(config.stride),
             margin_px: 0,
             noise: PixelNoise::guess(values),
             counts_per_value: 32768.0 / values,
-            saturation: values * (254.0 / 256.0),
+            saturation: config.saturation(),
             kernel: config.kernel,
         };
         let mut tracker = Self {
