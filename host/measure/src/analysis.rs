@@ -13,7 +13,7 @@ use rowtone::tracker::Axes;
 use crate::MeasureError;
 use crate::keyed::Held;
 use crate::tracking::{FrameShifts, Shifts};
-use crate::wander::{self, Wander};
+use crate::wander::Wander;
 use rowtone_clip::{Camera, Rect};
 use rowtone_memory::SpectrumMemory;
 
@@ -155,9 +155,7 @@ pub enum Event<'a> {
 pub struct Analysis<'a> {
     shifts: Shifts,
     reports: ReportSide<'a>,
-    /// By how much the first frames showed all of the picture to shake, px.
-    shake_px: Option<f64>,
-    /// Where the picture was on average, frame by frame.
+    /// What the camera itself does.
     wander: Wander,
     /// Frames without samples.
     silence: Silence,
@@ -186,7 +184,6 @@ impl<'a> Analysis<'a> {
         Ok(Self {
             shifts,
             reports,
-            shake_px: None,
             wander: Wander::new(plan.config.window_ns),
             silence: Silence::new(plan.config.window_ns, plan.config.hop_ns),
             held: None,
@@ -242,7 +239,7 @@ impl<'a> Analysis<'a> {
         on: &mut impl FnMut(Event<'_>) -> Result<(), E>,
     ) -> Result<(), E> {
         if let Some(chosen) = frame.chosen {
-            self.shake_px = chosen.shake_px;
+            self.wander.note_shake(chosen.shake_px);
             self.held = chosen.keyed.then(Held::default);
             on(Event::Part(chosen.part))?;
         }
@@ -295,9 +292,7 @@ impl<'a> Analysis<'a> {
         self.silence.number(&mut report);
         // What the recording as a whole warns of.
         report.warnings = report.warnings.union(self.shifts.camera.warnings);
-        let largest_px = wander::largest_px(&report);
-        let shakes = (self.shake_px).is_some_and(|px| wander::is_told(px as f32, largest_px));
-        let moves = shakes || self.wander.exceeds(&report);
+        let moves = self.wander.exceeds(&report);
         report.warnings.insert_if(moves, Warning::CameraMoves);
         let mut shapes = self.reports.shapes().to_vec();
         for row in shapes.iter_mut().flat_map(|s| &mut s.rows) {

@@ -19,25 +19,12 @@ const TIMES: f32 = 1.5;
 /// of; a motion along the columns of which the rows see a little everywhere looks like such a shake.
 const MUCH_MORE: f32 = 4.0;
 
-/// Whether a camera that shakes by `shake_px` is to be told where the largest tone of the report has
-/// `largest_px`.
-pub(crate) fn is_told(shake_px: f32, largest_px: f32) -> bool {
-    largest_px < MUCH_MORE * shake_px
-}
-
-/// The largest amplitude of the report's tones, px; 0 where there is none.
-pub(crate) fn largest_px(report: &Report) -> f32 {
-    report
-        .peaks
-        .iter()
-        .map(|p| p.amplitude_px)
-        .fold(0.0, f32::max)
-}
-
-/// Where the picture was on average in the frames of a window.
+/// By how much the picture shakes, and where it was on average in the frames of a window.
 #[derive(Clone, Debug)]
 pub(crate) struct Wander {
     window_ns: i64,
+    /// By how much all of it shakes, px.
+    shake_px: Option<f32>,
     /// Start of each frame, ns, and the mean of its samples, px.
     frames: VecDeque<(i64, f32)>,
 }
@@ -46,8 +33,14 @@ impl Wander {
     pub(crate) fn new(window_ns: i64) -> Self {
         Self {
             window_ns,
+            shake_px: None,
             frames: VecDeque::new(),
         }
+    }
+
+    /// The first frames showed that all of the picture shakes by this much, px, or does not.
+    pub(crate) fn note_shake(&mut self, px: Option<f64>) {
+        self.shake_px = px.map(|px| px as f32);
     }
 
     /// Takes a frame's readings.
@@ -65,11 +58,13 @@ impl Wander {
         }
     }
 
-    /// The picture wanders by more than the tones of the report, and what they may leave in pieces of a window.
+    /// The picture shakes, or wanders by more than the tones of the report and what they may leave in pieces of a window.
     pub(crate) fn exceeds(&self, report: &Report) -> bool {
-        let largest = largest_px(report);
-        self.half_span_px()
-            .is_some_and(|px| px > LEAST_PX.max(TIMES * largest))
+        let largest = report.peaks.iter().map(|p| p.amplitude_px);
+        let largest = largest.fold(0.0, f32::max);
+        let shakes = self.shake_px.is_some_and(|px| is_told(px, largest));
+        let wanders = |px| px > LEAST_PX.max(TIMES * largest);
+        shakes || self.half_span_px().is_some_and(wanders)
     }
 
     /// Half of what the pieces' means span, px; a piece's mean is the median of its frames', so that a frame that is elsewhere
@@ -90,6 +85,11 @@ impl Wander {
         });
         Some(0.5 * (most - least))
     }
+}
+
+/// Whether a camera that shakes by `shake_px` is to be told where the largest tone of the report has `largest_px`.
+fn is_told(shake_px: f32, largest_px: f32) -> bool {
+    largest_px < MUCH_MORE * shake_px
 }
 
 #[cfg(test)]
