@@ -40,6 +40,24 @@ pub struct Motion {
     pub spread_hz: Option<f32>,
 }
 
+impl Motion {
+    /// A rigid motion of a steady tone, of which neither axis is known and the phase is 0 rad.
+    pub const STEADY: Self = Self {
+        x_px: None,
+        x_px_sd: None,
+        y_px: None,
+        y_px_sd: None,
+        phase_rad: 0.0,
+        y_phase_rad: None,
+        across_rad: None,
+        rigid: true,
+        decay_s: None,
+        hz_per_s: None,
+        modulation: None,
+        spread_hz: None,
+    };
+}
+
 /// How a tone's amplitude or phase swings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Modulation {

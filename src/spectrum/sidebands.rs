@@ -226,16 +226,8 @@ mod tests {
                 motion: Some(Motion {
                     x_px: Some(px),
                     x_px_sd: Some(0.0005),
-                    y_px: None,
-                    y_px_sd: None,
                     phase_rad: phase,
-                    y_phase_rad: None,
-                    across_rad: None,
-                    rigid: true,
-                    decay_s: None,
-                    hz_per_s: None,
-                    modulation: None,
-                    spread_hz: None,
+                    ..Motion::STEADY
                 }),
             },
             hz_per_s: 0.0,

@@ -36,7 +36,6 @@ const SMALL_MOTION_PX: f32 = 0.6;
 impl Tracker<'_> {
     /// Forgets the reference and learns it again from the next line on. Counters go on.
     pub fn relearn(&mut self) {
-        let values = 32768.0 / self.store.recipe().counts_per_value;
         self.stage = Stage::Rough;
         self.frame = None;
         self.schedule.fast_path.end();
@@ -55,7 +54,7 @@ impl Tracker<'_> {
         self.check = Check::new(super::search::starts(&self.config));
         self.store.set_saturation(self.config.saturation());
         self.store.forget(
-            PixelNoise::guess(values),
+            PixelNoise::guess(self.config.values()),
             self.config.level.unwrap_or(Level::Medium),
             usize::from((self.config.width / 8).min(self.config.search_px)),
         );

@@ -43,11 +43,11 @@ impl Light {
         (self.to_reference, self.brightest) = (1.0, 1.0);
     }
 
-    /// A row is learned in the light of the last line. (A row in four makes the difference, so that noise does not.)
+    /// A row is learned in the light of the last line. Each brighter one counts for a quarter, so that no single row
+    /// decides.
     pub(super) fn note_learned(&mut self) {
-        let brighter = (self.to_reference - self.brightest).min(0.0);
-        if self.to_reference > Self::FLASH {
-            self.brightest += 0.25 * brighter;
+        if (Self::FLASH..self.brightest).contains(&self.to_reference) {
+            self.brightest += 0.25 * (self.to_reference - self.brightest);
         }
     }
 

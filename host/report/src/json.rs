@@ -351,16 +351,9 @@ mod tests {
         report.peaks[0].motion = Some(Motion {
             x_px: Some(0.3998),
             x_px_sd: Some(0.0002),
-            y_px: None,
-            y_px_sd: None,
             phase_rad: 0.31,
-            y_phase_rad: None,
-            across_rad: None,
             rigid: false,
-            decay_s: None,
-            hz_per_s: None,
-            modulation: None,
-            spread_hz: None,
+            ..Motion::STEADY
         });
         let row = ShapeRow {
             row: 7,

@@ -108,12 +108,7 @@ mod tests {
             y_px_sd: Some(0.0002),
             phase_rad: 0.3,
             y_phase_rad: Some(0.3 + late),
-            across_rad: None,
-            rigid: true,
-            decay_s: None,
-            hz_per_s: None,
-            modulation: None,
-            spread_hz: None,
+            ..Motion::STEADY
         }
     }
 

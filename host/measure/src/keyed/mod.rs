@@ -328,12 +328,7 @@ impl<'a> Judge<'a> {
                 y_px_sd: planar.then(|| of(y_sd)),
                 phase_rad: half_turn(phase) as f32,
                 y_phase_rad: planar.then(|| half_turn(y_phase) as f32),
-                across_rad: None,
-                rigid: true,
-                decay_s: None,
-                hz_per_s: None,
-                modulation: None,
-                spread_hz: None,
+                ..Motion::STEADY
             }),
         }
     }
