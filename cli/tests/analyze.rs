@@ -32,6 +32,46 @@ fn a_clip_gives_its_tone_once_a_window() {
 }
 
 #[test]
+fn a_summary_closes_with_the_whole_recording() {
+    let clip = file("summary.y4m", &y4m(config(150)));
+    let output = on_clip("analyze", &clip, &["--format", "json", "--summary"]);
+    let (stdout, stderr) = texts(&output);
+    assert!(output.status.success(), "{stderr}");
+    let objects = reports(&stdout);
+    let (last, windows) = objects.split_last().expect("a line");
+    assert!(
+        windows.len() >= 3 && windows.iter().all(|w| w.get("summary").is_none()),
+        "{stdout}"
+    );
+    assert_eq!(last["summary"], true);
+    assert_eq!(last["windows"], windows.len());
+    let tone = &last["peaks"][0];
+    assert_eq!(tone["windows"], windows.len());
+    let (hz, sd) = (
+        tone["hz"].as_f64().unwrap(),
+        tone["hz_sd"].as_f64().unwrap(),
+    );
+    // Fixed seeds; five standard deviations.
+    assert!((hz - common::HZ).abs() < 5.0 * sd, "{tone}");
+    let first = windows[0]["peaks"][0]["hz_sd"].as_f64().unwrap();
+    assert!(
+        sd < first,
+        "the whole knows no less than its first window: {tone}"
+    );
+    let text = texts(&on_clip("analyze", &clip, &["--summary"])).0;
+    let whole = text
+        .split("The whole recording: ")
+        .nth(1)
+        .expect("a summary");
+    assert!(
+        whole.contains("133.3") && whole.contains("in all "),
+        "{text}"
+    );
+    let wire = on_clip("analyze", &clip, &["--summary", "--format", "wire"]);
+    assert_failure(&wire, 2, &["--summary"]);
+}
+
+#[test]
 fn standard_input_and_deep_pixels_are_read_as_well() {
     let mut deep = config(60);
     deep.sensor.bits = 10;

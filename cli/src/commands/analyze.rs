@@ -20,6 +20,7 @@ use rowtone_measure::analysis::{Analysis, Event, Plan};
 use rowtone_measure::tracking::Shifts;
 use rowtone_plot::Picture;
 use rowtone_report::json::{self, Place};
+use rowtone_report::summary::Summary;
 use rowtone_report::text;
 use rowtone_report::zone::ZoneLimits;
 use rowtone_serial::port::PortName;
@@ -46,6 +47,9 @@ pub struct Args {
     /// Format of the reports on standard output
     #[arg(long, value_enum, default_value = "text")]
     format: Format,
+    /// Closes with the whole recording: the tones that persist over its windows first, how often and how steady
+    #[arg(long)]
+    summary: bool,
     /// Also sends every report to a serial port, as a board would
     #[arg(long, value_name = "PORT[:BAUD]")]
     serial: Option<PortName>,
@@ -77,6 +81,11 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         WholeFile::check(path).map_err(|e| Failure::writing(&path.display().to_string(), &e))?;
     }
     args.report.as_deref().map_or(Ok(()), StillPage::check)?;
+    if args.summary && args.format == Format::Wire {
+        let why =
+            "--summary: a wire has no sentence for a whole recording: use --format text or json";
+        return Err(Failure::usage(why));
+    }
     let options = args.camera.options();
     let session = session();
     let serial = args.serial.as_ref().map(|port| {
@@ -125,6 +134,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         page,
         session,
         reports: 0,
+        summary: args.summary.then(Summary::default),
     };
     let mut memory = plan.memory();
     let mut analysis = Analysis::new(shifts, &plan, &mut memory)?;
@@ -181,6 +191,7 @@ struct Outlets {
     page: Option<StillPage>,
     session: u32,
     reports: u64,
+    summary: Option<Summary>,
 }
 
 impl Outlets {
@@ -210,6 +221,9 @@ impl Outlets {
     /// Hands a report on, as soon as it is known.
     fn report(&mut self, report: &Report, shapes: &[PeakShape]) -> Result<(), Failure> {
         self.reports += 1;
+        if let Some(summary) = &mut self.summary {
+            summary.take(report);
+        }
         if let Some(picture) = &mut self.picture {
             picture.report(report);
         }
@@ -246,6 +260,19 @@ impl Outlets {
         })
     }
 
+    fn sum_up(&mut self) -> Result<(), Failure> {
+        let Some(summary) = self.summary.as_ref().filter(|_| self.reports > 0) else {
+            return Ok(());
+        };
+        let limits = self.zone_limits.as_ref();
+        let said = match self.format {
+            Format::Json => summary.json(limits),
+            Format::Text | Format::Wire => summary.text(limits),
+        };
+        let out = &mut self.out;
+        self.progress.aside(|| out.line(&said))
+    }
+
     /// The report as a board would send it; `None` with a note when it has a number that no wire takes.
     fn sentence(&self, report: &Report) -> Option<String> {
         let mut sentence = String::new();
@@ -263,11 +290,13 @@ impl Outlets {
         }
     }
 
-    /// Writes the picture and the page, and waits for the serial port.
-    fn close(self) -> Result<(), Failure> {
+    /// Says what the whole recording is, writes the picture and the page, and waits for the serial port.
+    fn close(mut self) -> Result<(), Failure> {
+        let summed = self.sum_up();
         let drawn = self.picture.map_or(Ok(()), |picture| picture.save());
         let written = self.page.map_or(Ok(()), StillPage::save);
         let sent = self.serial.map_or(Ok(None), Sender::finish);
+        summed?;
         drawn?;
         written?;
         if let Some(note) = sent? {

@@ -6,6 +6,7 @@ mod example;
 pub mod json;
 pub mod machine;
 mod motion;
+pub mod summary;
 pub mod text;
 pub mod zone;
 
