@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use crate::known_length::KnownLength;
+use crate::quantity::{Unit, number};
 use rowtone::tracker::Axes;
 use rowtone_clip::{CameraOptions, FRAME_RATES_HZ, Rect, Roi, Turn};
 
@@ -20,13 +21,13 @@ pub(crate) struct CameraArgs {
     #[arg(long, value_name = "FILE")]
     pub pts: Option<PathBuf>,
     /// Time from one row to the next, µs
-    #[arg(long, value_name = "T", value_parser = positive, allow_negative_numbers = true, conflicts_with = "global_shutter")]
+    #[arg(long, value_name = "T", value_parser = line_time, allow_negative_numbers = true, conflicts_with = "global_shutter")]
     pub line_time_us: Option<f64>,
     /// Takes the line time from a file that `rowtone calibrate` wrote
     #[arg(long, value_name = "FILE", conflicts_with_all = ["line_time_us", "global_shutter"])]
     pub calibration: Option<PathBuf>,
     /// Exposure of a row, µs [default: the calibration's; else not known, and amplitudes are as filmed]
-    #[arg(long, value_name = "T", value_parser = not_negative, allow_negative_numbers = true)]
+    #[arg(long, value_name = "T", value_parser = exposure, allow_negative_numbers = true)]
     pub exposure_us: Option<f64>,
     /// Part of the picture to use, px; also `full` or `auto` [default: auto]
     #[arg(
@@ -58,7 +59,7 @@ pub(crate) struct CameraArgs {
     #[arg(long)]
     pub global_shutter: bool,
     /// Scale: adds µm and mm/s to the output
-    #[arg(long, value_name = "S", group = "scale", value_parser = positive, allow_negative_numbers = true)]
+    #[arg(long, value_name = "S", group = "scale", value_parser = scale, allow_negative_numbers = true)]
     um_per_px: Option<f64>,
     /// Scale by something of known length: two places in the given picture, px, and how far apart they are
     #[arg(
@@ -80,26 +81,33 @@ fn axes(text: &str) -> Result<Axes, String> {
 
 /// A frame rate, Hz.
 fn frame_rate(text: &str) -> Result<f64, String> {
-    number(text, |fps| FRAME_RATES_HZ.contains(&fps)).ok_or_else(|| {
+    number(text, Unit::Hertz, FRAME_RATES_HZ, || {
         let (least, most) = (FRAME_RATES_HZ.start(), FRAME_RATES_HZ.end());
         format!("want a frame rate from {least} to {most} Hz")
     })
 }
 
-/// A finite number above 0.
-fn positive(text: &str) -> Result<f64, String> {
-    number(text, |x| x > 0.0).ok_or_else(|| "want a number above 0".to_owned())
+/// A scale, above 0.
+fn scale(text: &str) -> Result<f64, String> {
+    positive(text, Unit::Bare)
 }
 
-/// A finite number, at least 0.
-fn not_negative(text: &str) -> Result<f64, String> {
-    number(text, |x| x >= 0.0).ok_or_else(|| "want a number, at least 0".to_owned())
+/// A time above 0, µs.
+fn line_time(text: &str) -> Result<f64, String> {
+    positive(text, Unit::Microseconds)
 }
 
-fn number(text: &str, good: impl Fn(f64) -> bool) -> Option<f64> {
-    text.parse()
-        .ok()
-        .filter(|x: &f64| x.is_finite() && good(*x))
+fn positive(text: &str, unit: Unit) -> Result<f64, String> {
+    number(text, unit, f64::MIN_POSITIVE.., || {
+        "want a number above 0".to_owned()
+    })
+}
+
+/// A time, at least 0, µs.
+fn exposure(text: &str) -> Result<f64, String> {
+    number(text, Unit::Microseconds, 0.0.., || {
+        "want a number, at least 0".to_owned()
+    })
 }
 
 impl CameraArgs {

@@ -11,5 +11,6 @@ pub mod commands;
 pub mod failure;
 mod known_length;
 pub mod output;
+mod quantity;
 pub mod stop;
 mod terminal;

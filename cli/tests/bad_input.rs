@@ -119,6 +119,38 @@ fn what_was_measured_before_the_times_end_comes_out() {
 }
 
 #[test]
+fn what_was_meant_is_told() {
+    let wrong = |args: &[&str], words: &[&str]| {
+        assert_failure(&command(args).output().unwrap(), 2, words);
+    };
+    wrong(&["phone.mp4"], &["rowtone analyze phone.mp4"]);
+    let analyze = ["analyze", "clip.y4m"];
+    wrong(
+        &[&analyze[..], &["--line-time-us", "80us"]].concat(),
+        &["in µs: 80"],
+    );
+    let exposure = ["--line-time-us", "80", "--exposure-us", "0.5ms"];
+    wrong(&[&analyze[..], &exposure].concat(), &["in µs: 500"]);
+    wrong(&[&analyze[..], &["--fps", "60Hz"]].concat(), &["in Hz: 60"]);
+    let gap = ["--line-time-us", "80", "--window", "500ms"];
+    wrong(&[&analyze[..], &gap].concat(), &["in s: 0.5"]);
+    let gap = ["--line-time-us", "80", "--hop", "3"];
+    wrong(
+        &[&analyze[..], &gap].concat(),
+        &["--hop 3 is longer", "--window 1"],
+    );
+    wrong(
+        &["calibrate", "led.mp4", "--led-hz", "1kHz"],
+        &["in Hz: 1000"],
+    );
+    wrong(
+        &["calibrate", "led.mp4", "--led-hz", "-5"],
+        &["--led-hz", "above 0"],
+    );
+    wrong(&["simulate", "-o", "clip.mp4"], &["is Y4M", "clip.y4m"]);
+}
+
+#[test]
 fn command_lines_that_are_wrong() {
     let clip = file("options.y4m", &y4m(config(5)));
     let path = clip.to_str().unwrap();

@@ -136,6 +136,9 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         reports: 0,
         summary: args.summary.then(Summary::default),
     };
+    if let Some(gap) = args.window.gap() {
+        outlets.progress.note(&gap);
+    }
     let mut memory = plan.memory();
     let mut analysis = Analysis::new(shifts, &plan, &mut memory)?;
     let outcome = analysis.run(|event| outlets.hear(event));

@@ -166,13 +166,34 @@ fn one_line(text: &str) -> String {
         .next()
         .unwrap_or(what);
     let mut parts: Vec<&str> = what.split("tip: ").map(str::trim).collect();
-    parts.push("try --help");
+    let hint = recording(what)
+        .map(|name| format!("to measure a recording: rowtone analyze {name} --line-time-us T"));
+    parts.push(hint.as_deref().unwrap_or("try --help"));
     parts.join("; ")
+}
+
+/// The name of the file that stands where a command should.
+fn recording(what: &str) -> Option<&str> {
+    let name = what
+        .strip_prefix("unrecognized subcommand '")?
+        .split('\'')
+        .next()?;
+    (name.contains(['.', '/']) || std::path::Path::new(name).exists()).then_some(name)
 }
 
 #[cfg(test)]
 mod tests {
     use super::one_line;
+
+    #[test]
+    fn a_recording_without_a_command_is_told_which() {
+        let text = "error: unrecognized subcommand 'phone.mp4'\n\nUsage: rowtone [COMMAND]\n";
+        assert_eq!(
+            one_line(text),
+            "unrecognized subcommand 'phone.mp4'; \
+             to measure a recording: rowtone analyze phone.mp4 --line-time-us T"
+        );
+    }
 
     #[test]
     fn a_tip_of_the_parser_is_told_apart_from_what_it_is_about() {

@@ -21,6 +21,7 @@ use rowtone_files::WholeFile;
 /// [`Failure::Usage`] when the options contradict each other or ask for an impossible camera,
 /// [`Failure::Input`] when a picture or sound cannot be read or an output not be written.
 pub fn run(args: &Args) -> Result<(), Failure> {
+    check_ending(&args.output)?;
     let camera = Camera::new(args.config()?).map_err(|e| match e {
         SimError::File { .. } => Failure::input(e.to_string()),
         other => Failure::usage(other.to_string()),
@@ -48,6 +49,25 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         write_clip(&mut out, &args.output.display().to_string(), &camera)?;
         write_to(&args.output, out.finish())
     }
+}
+
+/// A clip that is named as another kind of video would be taken for one.
+fn check_ending(path: &Path) -> Result<(), Failure> {
+    const OTHERS: [&str; 11] = [
+        "mp4", "mov", "mkv", "avi", "webm", "mjpeg", "gif", "png", "jpg", "jpeg", "json",
+    ];
+    let ending = path.extension().and_then(|e| e.to_str()).unwrap_or("");
+    if !OTHERS
+        .iter()
+        .any(|other| ending.eq_ignore_ascii_case(other))
+    {
+        return Ok(());
+    }
+    let (name, clip) = (path.display(), path.with_extension("y4m"));
+    let clip = clip.display();
+    Err(Failure::usage(format!(
+        "-o {name}: the clip is Y4M: name it {clip} (ffmpeg makes other videos of it)"
+    )))
 }
 
 /// Where the frame times go: as asked, else beside a clip whose frames do not come evenly.

@@ -1,6 +1,7 @@
 //! The options that say what is looked for in a window: the same for every command that reports tones.
 
 use crate::failure::Failure;
+use crate::quantity::{Unit, number};
 use rowtone::report::MAX_PEAKS;
 use rowtone_measure::analysis::Settings;
 
@@ -37,7 +38,8 @@ impl WindowArgs {
     /// What can be checked without the input.
     ///
     /// # Errors
-    /// [`Failure::Usage`] where the lowest frequency is not below the highest, or windows follow each other too fast.
+    /// [`Failure::Usage`] where the lowest frequency is not below the highest, or windows follow each other too
+    /// fast.
     pub fn check(&self) -> Result<(), Failure> {
         if self.hop_s() < LEAST_HOP_S {
             let (option, value, least) = match self.hop {
@@ -56,6 +58,15 @@ impl WindowArgs {
             )));
         }
         Ok(())
+    }
+
+    /// What lies between two windows is not measured, which nobody may have meant.
+    pub fn gap(&self) -> Option<String> {
+        let hop = self.hop.filter(|hop| *hop > self.window)?;
+        let window = self.window;
+        Some(format!(
+            "--hop {hop} is longer than --window {window}: what lies between two windows is not measured"
+        ))
     }
 
     /// The analysis's settings, with this scale in µm a pixel.
@@ -85,16 +96,15 @@ impl WindowArgs {
 }
 
 fn seconds(text: &str) -> Result<f64, String> {
-    in_range(text, 0.001, 3600.0, "s")
+    in_range(text, 0.001, 3600.0, Unit::Seconds, "s")
 }
 
 pub(super) fn hertz(text: &str) -> Result<f64, String> {
-    in_range(text, 1e-3, 1e6, "Hz")
+    in_range(text, 1e-3, 1e6, Unit::Hertz, "Hz")
 }
 
-fn in_range(text: &str, low: f64, high: f64, unit: &str) -> Result<f64, String> {
-    let number = text.parse().ok();
-    number
-        .filter(|x: &f64| (low..=high).contains(x))
-        .ok_or_else(|| format!("want a number from {low} to {high} {unit}"))
+fn in_range(text: &str, low: f64, high: f64, unit: Unit, name: &str) -> Result<f64, String> {
+    number(text, unit, low..=high, || {
+        format!("want a number from {low} to {high} {name}")
+    })
 }

@@ -7,6 +7,7 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use crate::failure::Failure;
+use crate::quantity::hertz;
 use pictures::{each_picture, full_scale};
 use rowtone_calibrate::rows::{Collector, Recording};
 use rowtone_calibrate::{Light, calibrate_with_stripes, plot, vibration};
@@ -27,7 +28,7 @@ pub struct Args {
     #[arg(required = true)]
     pub input: Vec<String>,
     /// An LED flashes at this frequency, Hz
-    #[arg(long, value_name = "F")]
+    #[arg(long, value_name = "F", value_parser = hertz, allow_negative_numbers = true)]
     pub led_hz: Option<f64>,
     /// Share of its period that the LED is on: only so are exposure and on-time told apart
     #[arg(long, value_name = "D", default_value_t = 0.5, requires = "led_hz")]
@@ -42,18 +43,20 @@ pub struct Args {
     #[arg(long)]
     pub from_vibration: bool,
     /// About the frequency of the unknown light or tone, to a fraction of the frame rate
-    #[arg(long, value_name = "F")]
+    #[arg(long, value_name = "F", value_parser = hertz, allow_negative_numbers = true)]
     pub about_hz: Option<f64>,
     /// The exact frequency of the machine tone, Hz
     #[arg(
         long,
         value_name = "F",
+        value_parser = hertz,
+        allow_negative_numbers = true,
         requires = "from_vibration",
         conflicts_with = "about_hz"
     )]
     pub tone_hz: Option<f64>,
     /// Frame rate, Hz [default: the file's]
-    #[arg(long, value_name = "F")]
+    #[arg(long, value_name = "F", value_parser = hertz, allow_negative_numbers = true)]
     pub fps: Option<f64>,
     /// Start of exposure of every frame: timecode format v2, ms
     #[arg(long, value_name = "FILE")]
@@ -97,16 +100,6 @@ fn mains(text: &str) -> Result<u32, String> {
 /// # Errors
 /// [`Failure`] for an input that cannot be read and for stripes that give no calibration to rely on.
 pub fn run(args: &Args) -> Result<(), Failure> {
-    for (name, value) in [
-        ("--led-hz", args.led_hz),
-        ("--about-hz", args.about_hz),
-        ("--tone-hz", args.tone_hz),
-        ("--fps", args.fps),
-    ] {
-        if value.is_some_and(|v| !v.is_finite() || v <= 0.0) {
-            return Err(Failure::usage(format!("{name}: want a number above 0")));
-        }
-    }
     if args.fps.is_some_and(|fps| !(1e-3..=1e7).contains(&fps)) {
         return Err(Failure::usage(
             "--fps: want a frame rate from 0.001 to 10000000 Hz",
