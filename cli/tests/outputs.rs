@@ -7,7 +7,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
 use common::{
-    CAMERA, assert_failure, assert_the_tone, command, config, file, on_clip, reports, texts, y4m,
+    CAMERA, HZ, PX, assert_failure, assert_the_tone, command, config, file, on_clip, reports,
+    texts, y4m,
 };
 
 /// An empty folder of one test.
@@ -43,6 +44,13 @@ fn places_that_cannot_be_written_are_refused_at_once() {
             "/nodir/x.png",
         ),
         ("analyze", &["--plot", "x.gif"], 2, "x.gif"),
+        (
+            "analyze",
+            &["--spectrum", "/nodir/s.csv"],
+            1,
+            "/nodir/s.csv",
+        ),
+        ("analyze", &["--spectrum", "s.txt"], 2, "ends with .csv"),
         ("displacement", &["-o", "/nodir/x.csv"], 1, "/nodir/x.csv"),
         ("displacement", &["-o", "x.png"], 2, "csv, wav and npy"),
         ("displacement", &["-o", "motion.y4m"], 2, ".y4m"),
@@ -64,6 +72,49 @@ fn places_that_cannot_be_written_are_refused_at_once() {
         .output()
         .unwrap();
     assert_failure(&output, 1, &["/nodir/clip.y4m"]);
+}
+
+/// A row of a CSV whose first number is this; empty fields are not-a-number.
+fn row_at(csv: &str, hz: f64) -> Vec<f64> {
+    let numbers = |line: &str| -> Vec<f64> {
+        let fields = line.split(',');
+        fields.map(|f| f.parse().unwrap_or(f64::NAN)).collect()
+    };
+    let rows = csv.lines().skip(1).map(numbers);
+    let nearest = rows.min_by(|a, b| (a[0] - hz).abs().total_cmp(&(b[0] - hz).abs()));
+    nearest.expect("a row")
+}
+
+/// A tone stands in the spectrum as large as it is, far above the noise, and has no image a frame rate away.
+#[test]
+fn a_spectrum_is_written_with_its_floor() {
+    let folder = folder("spectrum");
+    let clip = file("spectrum.y4m", &y4m(config(120)));
+    let csv = folder.join("s.csv");
+    let to = csv.to_str().unwrap();
+    let output = on_clip("analyze", &clip, &["--spectrum", to, "--um-per-px", "50"]);
+    let (_, stderr) = texts(&output);
+    assert!(output.status.success(), "{stderr}");
+    let text = std::fs::read_to_string(&csv).unwrap();
+    assert_eq!(
+        text.lines().next(),
+        Some("hz,x_px,x_floor_px,y_px,y_floor_px,x_um,x_floor_um,y_um,y_floor_um")
+    );
+    let tone = row_at(&text, HZ);
+    assert!((tone[1] / PX - 1.0).abs() < 0.03, "{tone:?}");
+    assert!((tone[5] / tone[1] / 50.0 - 1.0).abs() < 1e-3, "{tone:?}");
+    // Noise of some 0.01 px a row, 7000 rows: 0.3 mpx; y is noise alone.
+    assert!((1e-5..2e-3).contains(&tone[2]), "{tone:?}");
+    assert!(tone[3] < 6.0 * tone[4], "{tone:?}");
+    for image in [HZ - 60.0, HZ + 60.0] {
+        let there = row_at(&text, image);
+        assert!(there[1] < 0.03 * PX, "{there:?}");
+    }
+    let output = on_clip("analyze", &clip, &["--spectrum", to, "--axes", "x"]);
+    assert!(output.status.success());
+    let text = std::fs::read_to_string(&csv).unwrap();
+    assert!(text.starts_with("hz,x_px,x_floor_px\n"), "{text}");
+    assert_eq!(names(&folder), ["s.csv"]);
 }
 
 /// A disk that is full in the middle: here a limit to the size of files.

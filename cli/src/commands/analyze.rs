@@ -14,6 +14,7 @@ use crate::failure::Failure;
 use crate::output::Out;
 use crate::output::page::StillPage;
 use crate::output::progress::Progress;
+use crate::output::spectrum_csv::SpectrumFile;
 use rowtone_clip::Feed;
 use rowtone_files::WholeFile;
 use rowtone_measure::analysis::{Analysis, Event, Plan};
@@ -56,6 +57,9 @@ pub struct Args {
     /// Also draws spectrum, displacement and spectrogram
     #[arg(long, value_name = "FILE.svg|.png")]
     plot: Option<PathBuf>,
+    /// Also writes the spectrum of the whole recording and its noise floor
+    #[arg(long, value_name = "FILE.csv")]
+    spectrum: Option<PathBuf>,
     /// Also writes the page of `rowtone serve` as one still file to hand on
     #[arg(long, value_name = "FILE.html")]
     report: Option<PathBuf>,
@@ -81,6 +85,9 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         WholeFile::check(path).map_err(|e| Failure::writing(&path.display().to_string(), &e))?;
     }
     args.report.as_deref().map_or(Ok(()), StillPage::check)?;
+    args.spectrum
+        .as_deref()
+        .map_or(Ok(()), SpectrumFile::check)?;
     if args.summary && args.format == Format::Wire {
         let why =
             "--summary: a wire has no sentence for a whole recording: use --format text or json";
@@ -115,6 +122,9 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             one_a_frame: args.camera.global_shutter,
         })
     });
+    let scale = args.camera.um_per_px();
+    let spectrum = args.spectrum.clone();
+    let spectrum = spectrum.map(|path| SpectrumFile::new(path, &plan, shifts.axes, scale));
     let part = shifts.part;
     let (width, height) = shifts.camera.size;
     let given = shifts.camera.turn.back().part(part, width, height);
@@ -131,6 +141,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         out: Out::default(),
         serial,
         picture,
+        spectrum,
         page,
         session,
         reports: 0,
@@ -191,6 +202,7 @@ struct Outlets {
     out: Out,
     serial: Option<Sender>,
     picture: Option<Picture>,
+    spectrum: Option<SpectrumFile>,
     page: Option<StillPage>,
     session: u32,
     reports: u64,
@@ -201,6 +213,9 @@ impl Outlets {
     fn hear(&mut self, event: Event<'_>) -> Result<(), Failure> {
         if let Some(page) = &mut self.page {
             page.shown().hear(&event);
+        }
+        if let Some(spectrum) = &mut self.spectrum {
+            spectrum.hear(&event);
         }
         match event {
             Event::Part(part) => self.place.roi = [part.x, part.y, part.width, part.height],
@@ -297,10 +312,12 @@ impl Outlets {
     fn close(mut self) -> Result<(), Failure> {
         let summed = self.sum_up();
         let drawn = self.picture.map_or(Ok(()), |picture| picture.save());
+        let told = self.spectrum.map_or(Ok(()), SpectrumFile::save);
         let written = self.page.map_or(Ok(()), StillPage::save);
         let sent = self.serial.map_or(Ok(None), Sender::finish);
         summed?;
         drawn?;
+        told?;
         written?;
         if let Some(note) = sent? {
             self.progress.note(&note);

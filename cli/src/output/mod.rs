@@ -1,4 +1,4 @@
-//! Results out: displacements as CSV, NPY and WAV, reports line by line.
+//! Results out: displacements as CSV, NPY and WAV, spectra as CSV, reports line by line.
 //!
 //! Standard output carries results and nothing else. [`Out`] writes lines to it (or to a file), each
 //! flushed as it is complete, and turns a closed pipe into [`Failure::OutputClosed`].
@@ -7,6 +7,7 @@ pub(crate) mod npy;
 pub(crate) mod page;
 pub mod progress;
 pub mod series;
+pub(crate) mod spectrum_csv;
 pub mod wav;
 
 use std::io::{self, Write};

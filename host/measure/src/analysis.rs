@@ -119,7 +119,7 @@ impl Plan {
     }
 
     /// Lowest frequency that is looked for, Hz.
-    fn min_hz(&self) -> f64 {
+    pub fn min_hz(&self) -> f64 {
         let period = 1.0 / self.window_s;
         self.config.min_hz.map_or(period, f64::from)
     }
