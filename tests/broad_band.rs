@@ -34,6 +34,15 @@ impl Draw {
 
 /// One second of 60 frames of 144 rows, 90 µs apart (22 % blank) and exposed for 0.8 ms, 0.008 px a row.
 fn second(waves: Waves<'_>, um_per_px: Option<f32>) -> rowtone::report::Report {
+    second_without(&[], waves, um_per_px)
+}
+
+/// The same where some rows are never measured.
+fn second_without(
+    missing: &[u16],
+    waves: Waves<'_>,
+    um_per_px: Option<f32>,
+) -> rowtone::report::Report {
     let timing = Timing::new(90_000_000, 800_000, 144).unwrap();
     let group = Group::new(timing, 1).unwrap();
     let mut memory = Box::new(StaticStorage::<{ 2 * 144 * 64 }, 128, 144, 8192, 17>::new());
@@ -51,7 +60,7 @@ fn second(waves: Waves<'_>, um_per_px: Option<f32>) -> rowtone::report::Report {
         axis.iter().map(weaken).collect::<Vec<_>>()
     });
     for frame in 0..60 {
-        for slot in 0..144_u16 {
+        for slot in (0..144_u16).filter(|slot| !missing.contains(slot)) {
             let start_ns = i64::from(frame) * 1_000_000_000 / 60;
             let time_ns = start_ns + group.middle_ns(slot);
             let t = time_ns as f64 * 1e-9;
@@ -146,6 +155,23 @@ fn random_vibration_has_its_velocity() {
     let speed = report.velocity_mm_s_rms.expect("a scale");
     let px_s = told.sum.velocity_px_s.unwrap().value;
     assert!((speed / px_s - 1.0).abs() < 1e-5, "{speed} {px_s}");
+}
+
+/// Rows without texture leave the velocity as it is: single ones all over the picture are bridged, and of many side by side
+/// the rest is used.
+#[test]
+fn rows_that_are_never_measured_take_no_velocity() {
+    let mut draw = Draw(5);
+    let x = random(&mut draw, [20.0, 400.0], 0.1);
+    let y = random(&mut draw, [30.0, 300.0], 0.05);
+    let want = truth(&x)[1].hypot(truth(&y)[1]);
+    let single: Vec<u16> = (0..144).step_by(15).collect();
+    let upper: Vec<u16> = (0..84).collect();
+    // Of 60 rows in a row half as many are heard as of 144.
+    for (missing, within) in [(single, 0.05), (upper, 0.08)] {
+        let told = second_without(&missing, [&x, &y], Some(1000.0)).broad_band;
+        is(told.expect("known").sum.velocity_px_s, want, within);
+    }
 }
 
 /// An orbit has the velocity of both axes; what stands still has none, and says what it may be.

@@ -74,7 +74,8 @@ pub(crate) fn measure(
         return None;
     }
     let (work, grid) = grid.split_at_mut(WORK);
-    let (filters, top_hz) = band(given, &lines)?;
+    let run = longest_run(samples, &lines, grid);
+    let (filters, top_hz) = band(given, &lines, run)?;
     keep_steady(samples, model, given);
     let removed = take::residual(samples, model);
     let mut all = Powers::default();
@@ -129,10 +130,17 @@ pub(crate) fn measure(
     })
 }
 
-/// Filters for these samples, and up to which frequency they know all.
-fn band<'a>(given: &Given<'a>, lines: &Lines) -> Option<(Grid<'a>, f32)> {
+/// Most neighbours of a line that are known all along; of the axis that has fewer, if they are enough.
+fn longest_run(samples: &Samples<'_>, lines: &Lines, grid: &mut [f32]) -> usize {
+    let axes = 0..samples.axes.clamp(1, 2);
+    let runs = axes.map(|axis| lines.longest_run(samples, axis, &mut grid[..lines.taps]));
+    runs.filter(|&run| run >= 3 * LEAST_HALF).min().unwrap_or(0)
+}
+
+/// Filters for these samples, of which so many in a row are known, and up to which frequency they know all.
+fn band<'a>(given: &Given<'a>, lines: &Lines, run: usize) -> Option<(Grid<'a>, f32)> {
     let half = (REACH_S / lines.step_s) as usize;
-    let half = half.min(MOST_HALF).min(lines.taps / 3);
+    let half = half.min(MOST_HALF).min(run / 3);
     if half < LEAST_HALF {
         return None;
     }

@@ -9,7 +9,7 @@ use super::super::shape::legendre;
 use super::super::window::unpack_weight;
 use super::Given;
 use crate::math::{cos_sin, turns};
-use crate::report::FROM_HZ;
+use crate::report::{FROM_HZ, TO_HZ};
 
 /// A slot whose second measurement knows nothing is used where it would change the first by less than this.
 const HARDLY_COUPLED: f32 = 0.02;
@@ -22,6 +22,9 @@ const MOST_COSINES: usize = 4;
 
 /// One of so many times the power of the others is a pattern.
 const STANDS_OUT: f32 = 4.0;
+
+/// Rows are bridged where the fastest motion of the band turns no further between their neighbours.
+const BRIDGED_TURNS: f32 = 0.3;
 
 /// Samples that follow each other at even distances: a frame's slots, or all frames of a camera whose rows are exposed
 /// at once.
@@ -65,6 +68,7 @@ impl Lines {
                 let at = first + slot * frames + line;
                 *value = samples.shift_px.get(at).copied().unwrap_or(f32::NAN);
             }
+            self.bridge(out, |weights, known| dot(&weights, known));
             return;
         }
         out.fill(f32::NAN);
@@ -90,7 +94,54 @@ impl Lines {
         for (slot, value) in out.iter_mut().enumerate() {
             *value = variance(samples, axis, slot);
         }
+        self.bridge(out, |weights, known| dot(&weights.map(|w| w * w), known));
     }
+
+    /// Most neighbours in a row that are known all along, of an axis; `out` is written over.
+    pub(super) fn longest_run(&self, samples: &Samples<'_>, axis: usize, out: &mut [f32]) -> usize {
+        self.variances(samples, axis, out);
+        let (mut run, mut longest) = (0, 0);
+        for value in out {
+            run = if value.is_finite() { run + 1 } else { 0 };
+            longest = longest.max(run);
+        }
+        longest
+    }
+
+    /// Bridges gaps of a few rows that nothing is known of, where rows lie so near each other that the fastest motion of the
+    /// band runs smoothly over them: `of` gives a value from the cubic's weights of the two neighbours on either side.
+    /// Else one row that is always missing would leave no place for a filter.
+    fn bridge(&self, line: &mut [f32], of: impl Fn([f32; 4], [f32; 4]) -> f32) {
+        let most = ((BRIDGED_TURNS / (self.step_s * TO_HZ)) as usize).saturating_sub(1);
+        let mut at = 2;
+        while at + 2 < line.len() {
+            let gap = line[at..].iter().take_while(|x| !x.is_finite()).count();
+            let after = at + gap;
+            if gap > 0 && gap <= most && after + 1 < line.len() {
+                let known = [at - 2, at - 1, after, after + 1].map(|place| line[place]);
+                for i in 0..gap {
+                    line[at + i] = of(cubic(i as f32 + 1.0, gap as f32 + 1.0), known);
+                }
+            }
+            at = after + 1;
+        }
+    }
+}
+
+/// Weights of Lagrange's cubic `t` places after the second of four: they lie at −1, 0, `end` and `end` + 1.
+fn cubic(t: f32, end: f32) -> [f32; 4] {
+    let (first, rest) = (t * (t - end) * (t - end - 1.0), (t + 1.0) / (end + 1.0));
+    let outer = (end + 1.0) * (end + 2.0);
+    [
+        -first / outer,
+        rest * (t - end) * (t - end - 1.0) / end,
+        -rest * t * (t - end - 1.0) / end,
+        rest * t * (t - end) / (end + 2.0),
+    ]
+}
+
+fn dot(weights: &[f32; 4], known: [f32; 4]) -> f32 {
+    weights.iter().zip(known).map(|(w, x)| w * x).sum()
 }
 
 /// Variance along an axis of a slot's samples, for a noise of unit variance in a sample of average weight.
@@ -255,5 +306,44 @@ pub(super) fn put_back(samples: &mut Samples<'_>, model: &Model, axis: usize) {
             let row = &mut samples.shift_px[first..first + n];
             rows::less_tone(row, &re[..n], &im[..n], Complex::new(-g.re, -g.im));
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn short_gaps_are_bridged_by_cubics_and_long_ones_stay() {
+        let lines = Lines {
+            count: 1,
+            taps: 24,
+            // Three rows at most: 0.3 turns of 1000 Hz are 300 µs.
+            step_s: 7e-5,
+            over_frames: false,
+        };
+        let curve = |i: usize| {
+            let t = i as f32 * 0.1;
+            2.0 + t - 0.5 * t * t + 0.3 * t * t * t
+        };
+        let gaps = [0, 3, 6, 7, 10, 11, 12, 15, 16, 17, 18];
+        let mut line = [0.0; 24];
+        for (i, value) in line.iter_mut().enumerate() {
+            *value = if gaps.contains(&i) {
+                f32::NAN
+            } else {
+                curve(i)
+            };
+        }
+        lines.bridge(&mut line, |weights, known| dot(&weights, known));
+        for (i, &value) in line.iter().enumerate() {
+            let bridged = ![0, 15, 16, 17, 18].contains(&i);
+            assert_eq!(value.is_finite(), bridged, "{i}");
+            assert!(!bridged || (value - curve(i)).abs() < 1e-4, "{i}: {value}");
+        }
+        let mut none = [f32::NAN; 4];
+        lines.bridge(&mut none, |weights, known| dot(&weights, known));
+        lines.bridge(&mut [], |weights, known| dot(&weights, known));
+        assert!(none.iter().all(|x| x.is_nan()));
     }
 }
