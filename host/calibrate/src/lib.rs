@@ -19,7 +19,8 @@
 //! | [`frames`] | frame period, direction |
 //! | [`exposure`], `simplex` | exposure of a row |
 //! | [`unknown`] | a light of unknown frequency |
-//! | [`vibration`] | a steady machine tone instead of a light |
+//! | [`vibration`] | a steady machine tone instead of a light, many periods in a frame |
+//! | [`tone`] | the same, of less than a period in a frame |
 //! | [`plot`] | the stripes and the fit, drawn |
 //! | [`mod@file`] | the result as TOML |
 
@@ -36,6 +37,7 @@ pub mod rows;
 pub mod search;
 mod simplex;
 pub mod stripes;
+pub mod tone;
 mod uncertainty;
 pub mod unknown;
 pub mod vibration;
@@ -99,13 +101,11 @@ pub fn calibrate_with_stripes(
         return Err(Refusal::LightHz { hz });
     }
     let stripes = stripes::find(&recording.rows, most_harmonics)?;
-    let mut warnings = Vec::new();
     let fit = &stripes.fit;
     let used_rows = fit.gain.len();
     // A part of the picture tells the line time; read-out and blank time are those of all its rows.
     let rows = recording.picture_rows.unwrap_or(used_rows);
     let times = recording.times_s.as_deref().filter(|t| t.len() > 1);
-    let nominal_period = recording.frame_period_s();
 
     let (hz, hz_sd, verdict) = match light {
         Light::Known { hz, hz_sd, .. } => {
@@ -133,6 +133,48 @@ pub fn calibrate_with_stripes(
             (found.hz, found.hz_sd, verdict)
         }
     };
+    let source = Source {
+        hz,
+        hz_sd,
+        verdict,
+        is_known: matches!(light, Light::Known { .. }),
+        duty,
+        is_light: true,
+    };
+    conclude(recording, source, stripes)
+}
+
+/// What was found of the light (or of the machine tone).
+struct Source {
+    hz: f64,
+    hz_sd: f64,
+    verdict: Verdict,
+    /// Its frequency was given, not found.
+    is_known: bool,
+    /// As [`Light::Known`]'s.
+    duty: Option<f64>,
+    is_light: bool,
+}
+
+/// The calibration that stripes of a source give, with all that is to be said of it.
+fn conclude(
+    recording: &Recording,
+    source: Source,
+    stripes: Stripes,
+) -> Result<(Calibration, Stripes), Refusal> {
+    let Source {
+        hz,
+        hz_sd,
+        verdict,
+        is_known: known,
+        duty,
+        is_light,
+    } = source;
+    let mut warnings = Vec::new();
+    let fit = &stripes.fit;
+    let rows = recording.picture_rows.unwrap_or(fit.gain.len());
+    let times = recording.times_s.as_deref().filter(|t| t.len() > 1);
+    let nominal_period = recording.frame_period_s();
     let [of_stripes, of_light] = [fit.per_row_sd / fit.model.per_row, hz_sd / hz];
     let relative_sd = of_stripes.hypot(of_light);
     let line_time_s = fit.model.per_row / hz;
@@ -152,7 +194,6 @@ pub fn calibrate_with_stripes(
             });
         }
     }
-    let known = matches!(light, Light::Known { .. });
     if known && times.is_none() {
         warnings.push(match nominal_period {
             Some(_) => "no frame times: the light's frequency is taken on trust".to_owned(),
@@ -169,8 +210,10 @@ pub fn calibrate_with_stripes(
                 Rolling::Down => RollingName::Down,
                 Rolling::Up => {
                     warnings.push(
-                        "the last row is read first; if this camera reads downwards, the light's frequency or the frame rate is wrong"
-                            .to_owned(),
+                        format!(
+                            "the last row is read first; if this camera reads downwards, the {}'s frequency or the frame rate is wrong",
+                            if is_light { "light" } else { "tone" }
+                        ),
                     );
                     RollingName::Up
                 }
@@ -246,7 +289,11 @@ pub fn calibrate_with_stripes(
         exposure_s: exposure.map(|e| e.0),
         exposure_s_sd: exposure.map(|e| e.1),
         rolling,
-        contrast: gain / rowtone_linear::median(&fit.offset).abs().max(1e-9),
+        contrast: if is_light {
+            gain / rowtone_linear::median(&fit.offset).abs().max(1e-9)
+        } else {
+            0.0
+        },
         warnings,
     };
     Ok((calibration, stripes))

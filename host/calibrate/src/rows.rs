@@ -24,6 +24,16 @@ pub struct Recording {
 }
 
 impl Recording {
+    /// Its first frames.
+    pub fn first(&self, frames: usize) -> Self {
+        let cut = |times: &Vec<f64>| times[..frames.min(times.len())].to_vec();
+        Self {
+            rows: self.rows[..frames.min(self.rows.len())].to_vec(),
+            times_s: self.times_s.as_ref().map(cut),
+            ..self.clone()
+        }
+    }
+
     /// Typical (median) time from frame to frame, s.
     pub fn frame_period_s(&self) -> Option<f64> {
         match &self.times_s {

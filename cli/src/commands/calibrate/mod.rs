@@ -10,17 +10,27 @@ use crate::failure::Failure;
 use crate::quantity::hertz;
 use pictures::{each_picture, full_scale};
 use rowtone_calibrate::rows::{Collector, Recording};
-use rowtone_calibrate::{Light, calibrate_with_stripes, plot, vibration};
-use rowtone_clip::Rect;
+use rowtone_calibrate::stripes::Stripes;
+use rowtone_calibrate::tone::motion::Watcher;
+use rowtone_calibrate::tone::{self, About};
+use rowtone_calibrate::{Calibration, Light, calibrate_with_stripes, plot};
+use rowtone_clip::{Rect, Turn};
 use rowtone_files::WholeFile;
 
 /// Standard deviation of the mains frequency, relative: ±0.03 Hz of 50, what large grids keep.
 const MAINS_RELATIVE_SD: f64 = 6e-4;
 
+/// Frames used unless said otherwise, of a light and of a vibration.
+const FRAMES: usize = 120;
+const VIBRATION_FRAMES: usize = 2000;
+
+/// What was looked at, and what it gave.
+type Found = (Recording, (Calibration, Stripes));
+
 /// Options of `rowtone calibrate`.
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "How precise on simulated cameras (one second of 480 rows): LED 1e-6; mains 6e-4,\nthe mains' own; unknown light 2e-5 by the camera's clock; a tone of 0.4 px 1e-4, of 0.05 px 1e-3.\ndocs/results.md says what makes each ambiguous.\n\nExamples:\n  rowtone calibrate led.mp4 --led-hz 1000 -o calibration.toml\n  rowtone calibrate picture.png --led-hz 1000 --fps 29.97 --plot stripes.svg\n  rowtone calibrate one.jpg two.jpg three.jpg --led-hz 1000\n  rowtone calibrate lamp.mp4 --mains 50"
+    after_help = "How precise on simulated cameras (one second of 480 rows): LED 1e-6; mains 6e-4,\nthe mains' own; unknown light 2e-5 by the camera's clock; a tone of 0.4 px 1e-4, of 0.05 px 1e-3,\nwhere it passes through two periods in a frame; below that about 1e-2.\ndocs/results.md says what makes each ambiguous.\n\nExamples:\n  rowtone calibrate led.mp4 --led-hz 1000 -o calibration.toml\n  rowtone calibrate picture.png --led-hz 1000 --fps 29.97 --plot stripes.svg\n  rowtone calibrate one.jpg two.jpg three.jpg --led-hz 1000\n  rowtone calibrate lamp.mp4 --mains 50\n  rowtone calibrate pump.mp4 --from-vibration"
 )]
 #[command(group(clap::ArgGroup::new("light").required(true).args(["led_hz", "mains", "unknown_light", "from_vibration"])))]
 pub struct Args {
@@ -39,7 +49,8 @@ pub struct Args {
     /// A steady light of unknown frequency: needs frames at two rates (with --pts), or --about-hz
     #[arg(long)]
     pub unknown_light: bool,
-    /// No light but a steady machine tone; its frequency with --about-hz, exact with --tone-hz
+    /// No light but a steady machine tone in the motion; where several line times explain it, --about-hz or
+    /// --tone-hz decides
     #[arg(long)]
     pub from_vibration: bool,
     /// About the frequency of the unknown light or tone, to a fraction of the frame rate
@@ -64,9 +75,20 @@ pub struct Args {
     /// Part of the picture to use, px; read-out and blank time are told of the whole picture all the same
     #[arg(long, value_name = "X,Y,W,H")]
     pub roi: Option<Rect>,
-    /// Most frames to use, from the start
-    #[arg(long, value_name = "N", default_value_t = 120)]
-    pub frames: usize,
+    /// Turns the given picture clockwise by so many degrees first, so that its rows are the sensor's: for pictures
+    /// that were turned, whose stripes run from top to bottom. The rotation that a phone writes into a video needs
+    /// none. --roi is given in the picture before it is turned
+    #[arg(
+        long,
+        value_name = "0|90|180|270",
+        default_value = "0",
+        hide_default_value = true,
+        allow_hyphen_values = true
+    )]
+    pub rotate: Turn,
+    /// Most frames to use, from the start [default: 120; of a vibration 2000]
+    #[arg(long, value_name = "N")]
+    pub frames: Option<usize>,
     /// What to print
     #[arg(long, value_enum, default_value_t = Format::Text)]
     pub format: Format,
@@ -114,38 +136,11 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         WholeFile::check(path).map_err(|e| Failure::writing(&path.display().to_string(), &e))?;
     }
     let name = args.input.join(" ");
-    let recording = if args.from_vibration {
-        let mut pictures = Vec::new();
-        let info = each_picture(args, |picture, width| {
-            pictures.push((picture.to_vec(), width))
-        })?;
-        let rows = vibration::displacements(&pictures)
-            .map_err(|why| Failure::input(format!("{name}: {why}")))?;
-        Recording {
-            rows,
-            times_s: info.times_s,
-            fps: info.fps,
-            saturated_share: 0.0,
-            black: None,
-            picture_rows: info.picture_rows,
-        }
+    let (recording, (calibration, stripes)) = if args.from_vibration {
+        from_vibration(args, &name)?
     } else {
-        let mut collector = None;
-        let info = each_picture(args, |picture, width| {
-            collector
-                .get_or_insert_with(|| Collector::new(width, full_scale(picture)))
-                .push(picture.chunks_exact(width));
-        })?;
-        let Some(collector) = collector else {
-            return Err(Failure::input(format!("{name}: no frame in it")));
-        };
-        Recording {
-            picture_rows: info.picture_rows,
-            ..collector.finish(info.times_s, info.fps)
-        }
+        from_light(args, &name)?
     };
-    let (calibration, stripes) = calibrate_with_stripes(&recording, light(args))
-        .map_err(|refusal| Failure::input(format!("{name}: {refusal}")))?;
     if let Some(path) = &args.output {
         write_file(path, &calibration.to_toml())?;
     }
@@ -156,7 +151,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         )?;
     }
     let text = match args.format {
-        Format::Text => report::text(&calibration),
+        Format::Text => report::text(&calibration, args.from_vibration),
         Format::Json => {
             serde_json::to_string(&calibration)
                 .map_err(|e| Failure::input(format!("calibration: {e}")))?
@@ -171,6 +166,60 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     io::stdout()
         .write_all(text.as_bytes())
         .map_err(|e| Failure::writing("standard output", &e))
+}
+
+/// Calibrates by the stripes of a light.
+fn from_light(args: &Args, name: &str) -> Result<Found, Failure> {
+    let mut collector = None;
+    let info = each_picture(args, |picture, width| {
+        collector
+            .get_or_insert_with(|| Collector::new(width, full_scale(picture)))
+            .push(picture.chunks_exact(width));
+        true
+    })?;
+    let Some(collector) = collector else {
+        return Err(Failure::input(format!("{name}: no frame in it")));
+    };
+    let recording = Recording {
+        picture_rows: info.picture_rows,
+        ..collector.finish(info.times_s, info.fps)
+    };
+    let found = calibrate_with_stripes(&recording, light(args))
+        .map_err(|refusal| Failure::input(format!("{name}: {refusal}")))?;
+    Ok((recording, found))
+}
+
+/// Calibrates by a tone in the motion: as stripes where it passes through periods in a frame, else by its slant.
+fn from_vibration(args: &Args, name: &str) -> Result<Found, Failure> {
+    let mut watcher = None;
+    let info = each_picture(args, |picture, width| {
+        let watcher = watcher.get_or_insert_with(|| Watcher::new(width, picture.len() / width));
+        watcher.push(picture);
+        !watcher.is_full()
+    })?;
+    let Some(watcher) = watcher else {
+        return Err(Failure::input(format!("{name}: no frame in it")));
+    };
+    let motion = watcher.finish();
+    let all = Recording {
+        times_s: info.times_s,
+        fps: info.fps,
+        picture_rows: info.picture_rows,
+        rows: motion.whole_rows(motion.frames.len()),
+        ..Recording::default()
+    };
+    let few = all.first(args.frames.unwrap_or(FRAMES));
+    if let Ok(found) = calibrate_with_stripes(&few, light(args)) {
+        return Ok((few, found));
+    }
+    let about = match (args.tone_hz, args.about_hz) {
+        (Some(hz), _) => About::Exactly(hz),
+        (_, Some(hz)) => About::Near(hz),
+        _ => About::Nothing,
+    };
+    let found = tone::calibrate(&motion, &all, about)
+        .map_err(|refusal| Failure::input(format!("{name}: {refusal}")))?;
+    Ok((all, found))
 }
 
 /// What the options say of the light.

@@ -22,10 +22,10 @@ pub(super) struct Info {
     pub(super) picture_rows: Option<usize>,
 }
 
-/// Hands out each picture (the part to use) with its width.
+/// Hands out each picture (the part to use, turned) with its width, until the sink says that it is enough.
 pub(super) fn each_picture(
     args: &Args,
-    mut sink: impl FnMut(&[u16], usize),
+    mut sink: impl FnMut(&[u16], usize) -> bool,
 ) -> Result<Info, Failure> {
     let [name] = &args.input[..] else {
         return each_of_several(args, &mut sink);
@@ -48,9 +48,12 @@ fn is_picture(name: &str) -> bool {
 }
 
 /// Several pictures, all alike; when each was taken is not known.
-fn each_of_several(args: &Args, sink: &mut impl FnMut(&[u16], usize)) -> Result<Info, Failure> {
+fn each_of_several(
+    args: &Args,
+    sink: &mut impl FnMut(&[u16], usize) -> bool,
+) -> Result<Info, Failure> {
     let mut first = None;
-    for name in args.input.iter().take(args.frames) {
+    for name in args.input.iter().take(most_frames(args)) {
         if !is_picture(name) {
             return Err(Failure::usage(format!(
                 "{name}: several inputs must all be PNG or JPEG pictures"
@@ -76,7 +79,7 @@ fn each_of_several(args: &Args, sink: &mut impl FnMut(&[u16], usize)) -> Result<
 fn picture(
     args: &Args,
     name: &str,
-    sink: &mut impl FnMut(&[u16], usize),
+    sink: &mut impl FnMut(&[u16], usize) -> bool,
 ) -> Result<(usize, usize), Failure> {
     let Grey {
         width,
@@ -89,19 +92,29 @@ fn picture(
         .into_iter()
         .map(|v| (f32::from(v) / 257.0).round() as u16)
         .collect();
-    hand_out(args, &values, width, height, sink)?;
-    Ok((width, height))
+    let whole = Rect::whole(width, height);
+    let part = args.roi.unwrap_or(whole);
+    if !part.fits(width, height) {
+        return Err(beyond(width, height));
+    }
+    let mut turned = Vec::new();
+    args.rotate.plane(&values, width, height, &mut turned);
+    let part = args.rotate.part(part, width, height);
+    let size = args.rotate.size(width, height);
+    hand_out(part, &turned, size.0, sink);
+    Ok(size)
 }
 
 /// The frames of a video.
 fn each_frame(
     args: &Args,
     name: &str,
-    mut sink: impl FnMut(&[u16], usize),
+    mut sink: impl FnMut(&[u16], usize) -> bool,
 ) -> Result<Info, Failure> {
     let options = CameraOptions {
         fps: args.fps,
         pts: args.pts.clone(),
+        rotate: args.rotate,
         // The line time is what is looked for.
         global_shutter: true,
         ..CameraOptions::of(name)
@@ -113,9 +126,17 @@ fn each_frame(
     }
     let (width, height) = feed.camera.size;
     let whole = Rect::whole(width, height);
+    // Given in the picture before it is turned.
+    let given = args.rotate.size(width, height);
+    let part = args.roi.unwrap_or(Rect::whole(given.0, given.1));
+    if !part.fits(given.0, given.1) {
+        return Err(beyond(given.0, given.1));
+    }
+    let part = args.rotate.part(part, given.0, given.1);
     let mut values = Vec::new();
     let mut starts_ns = Vec::new();
-    while starts_ns.len() < args.frames {
+    let mut is_enough = false;
+    while !is_enough && starts_ns.len() < most_frames(args) {
         let Some(frame) = feed.next_frame()? else {
             break;
         };
@@ -127,7 +148,7 @@ fn each_frame(
                 Pixels::Upper(row) => values.extend(row.iter().map(u16::from)),
             }
         }
-        hand_out(args, &values, width, height, &mut sink)?;
+        is_enough = !hand_out(part, &values, width, &mut sink);
         starts_ns.push(frame.start_ns);
         feed.recycle(frame);
     }
@@ -143,29 +164,34 @@ fn each_frame(
     })
 }
 
-/// Cuts the part to use out of a picture.
+/// Most frames to use.
+fn most_frames(args: &Args) -> usize {
+    let usual = if args.from_vibration {
+        super::VIBRATION_FRAMES
+    } else {
+        super::FRAMES
+    };
+    args.frames.unwrap_or(usual)
+}
+
+fn beyond(width: usize, height: usize) -> Failure {
+    Failure::usage(format!(
+        "--roi is not inside the picture of {width}x{height}"
+    ))
+}
+
+/// Cuts the part to use out of a picture of that width; whether more is wanted.
 fn hand_out(
-    args: &Args,
+    part: Rect,
     values: &[u16],
     width: usize,
-    height: usize,
-    sink: &mut impl FnMut(&[u16], usize),
-) -> Result<(), Failure> {
-    let Some(part) = args.roi else {
-        sink(values, width);
-        return Ok(());
-    };
-    if !part.fits(width, height) {
-        return Err(Failure::usage(format!(
-            "--roi is not inside the picture of {width}x{height}"
-        )));
-    }
+    sink: &mut impl FnMut(&[u16], usize) -> bool,
+) -> bool {
     let rows = values.chunks_exact(width).skip(part.y).take(part.height);
     let cut: Vec<u16> = rows
         .flat_map(|row| row[part.x..part.x + part.width].iter().copied())
         .collect();
-    sink(&cut, part.width);
-    Ok(())
+    sink(&cut, part.width)
 }
 
 #[cfg(test)]

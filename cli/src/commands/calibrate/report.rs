@@ -3,13 +3,14 @@
 use rowtone_calibrate::Calibration;
 use rowtone_calibrate::file::RollingName;
 
-/// The calibration for people.
-pub(super) fn text(c: &Calibration) -> String {
+/// The calibration for people, by a light or by a tone in the motion.
+pub(super) fn text(c: &Calibration, is_tone: bool) -> String {
     let mut lines = vec![
         format!("rows               {}", c.rows),
         format!("frames used        {}", c.frames),
         format!(
-            "light              {} Hz",
+            "{}              {} Hz",
+            if is_tone { "tone " } else { "light" },
             with_sd(c.light_hz, c.light_hz_sd, 1.0)
         ),
         format!(
@@ -61,7 +62,9 @@ pub(super) fn text(c: &Calibration) -> String {
         None => "not told",
     };
     lines.push(format!("rolling            {rolling}"));
-    lines.push(format!("stripe contrast    {:.1} %", 100.0 * c.contrast));
+    if !is_tone {
+        lines.push(format!("stripe contrast    {:.1} %", 100.0 * c.contrast));
+    }
     lines.join("\n") + "\n"
 }
 
@@ -93,7 +96,7 @@ mod tests {
             readout_s_sd: 0.6e-6,
             ..Calibration::default()
         };
-        let text = text(&c);
+        let text = text(&c, false);
         assert!(
             text.contains("read-out           15.74400 ± 0.00060 ms (1080 line times)"),
             "{text}"
