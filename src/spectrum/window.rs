@@ -137,7 +137,9 @@ const RAGGED: f32 = 0.15;
 /// beside it.
 pub(crate) fn follow_spread(known: &mut Spread, now: Spread, first: bool, even: &Spread) -> bool {
     let off = (now.variance_ns2 - known.variance_ns2).abs();
-    let usual = first || off <= RAGGED * even.variance_ns2;
+    // A single row cannot lack one: what its variance is off by is rounding.
+    let single = even.variance_ns2 <= 0.0;
+    let usual = first || single || off <= RAGGED * even.variance_ns2;
     let share = if first { 1.0 } else { FOLLOW };
     let variance = known.variance_ns2 + share * (now.variance_ns2 - known.variance_ns2);
     let third = known.third_ns3 + share * (now.third_ns3 - known.third_ns3);
@@ -182,4 +184,36 @@ pub struct WindowMark {
     pub short: bool,
     /// What its rows warn of.
     pub warnings: Warnings,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::Timing;
+
+    /// Variances of so many ns², in turn, of groups of so many rows of 10 µs: which samples are taken.
+    fn taken<const N: usize>(rows_per_sample: u16, variances_ns2: [f32; N]) -> [bool; N] {
+        let group = Group::new(Timing::new(10_000_000, 0, 120).unwrap(), rows_per_sample).unwrap();
+        let mut known = Spread::default();
+        let mut first = true;
+        variances_ns2.map(|variance_ns2| {
+            let now = Spread {
+                variance_ns2,
+                third_ns3: 0.0,
+            };
+            let first = core::mem::take(&mut first);
+            follow_spread(&mut known, now, first, &group.even_spread())
+        })
+    }
+
+    #[test]
+    fn a_group_that_lacks_rows_is_left_out_and_a_single_row_cannot() {
+        let whole = 8.25e8;
+        assert_eq!(
+            taken(10, [whole, whole, 0.6 * whole, whole]),
+            [true, true, false, true]
+        );
+        // What is left of x·x − x² by rounding.
+        assert_eq!(taken(1, [0.0, 6.0, 0.0, 12.0, 0.0]), [true; 5]);
+    }
 }
