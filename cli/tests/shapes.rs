@@ -2,8 +2,13 @@
 
 mod common;
 
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+
 use common::{assert_failure, command, config, file, on_clip, texts, y4m};
 use host_sim::{Config, Mode, Shape, Term, Wave};
+use rowtone_clip::CameraOptions;
+use rowtone_measure::shapes::{self, Wanted};
 use serde_json::Value;
 
 const HZ: f64 = 131.7;
@@ -174,4 +179,44 @@ fn what_cannot_be_told_is_refused_in_one_line() {
         .output()
         .expect("it runs");
     assert_failure(&piped, 2, &["give a file"]);
+}
+
+#[test]
+fn stopped_in_any_reading_it_measures_what_was_read_and_says_so() {
+    let clip = file("shapes-stopped.y4m", &y4m(bending(HZ, 60)));
+    let mut options = CameraOptions::of(clip.to_str().expect("a path"));
+    (options.line_time_us, options.exposure_us) = (Some(100.0), Some(500.0));
+    let wanted = Wanted {
+        hz: vec![HZ],
+        ..Wanted::default()
+    };
+    // In the first reading, which may be ahead of what is measured by all there is, and in the second.
+    for (after, least, most) in [(12, 12, 60), (60 + 40, 40, 40)] {
+        let (stop, mut read) = (Arc::default(), 0);
+        let shapes = shapes::measure(&options, &wanted, &stop, |frames| {
+            read += 1;
+            assert!(frames.is_some_and(|all| all <= 180), "{frames:?} {read}");
+            stop.store(read >= after, Ordering::Relaxed);
+        });
+        let shapes = shapes.expect("shapes");
+        let said = shapes.notes.join("\n");
+        let note = format!(
+            "stopped: shapes of the first {} of 60 frames",
+            shapes.frames
+        );
+        assert_eq!(said.contains(&note), shapes.frames < 60, "{said}");
+        assert!((least..=most).contains(&shapes.frames), "{said}");
+        let largest = (0..shapes.grid.tiles()).map(|tile| shapes.shapes[0].amplitude_px(tile));
+        let largest = largest.fold(0.0, f64::max);
+        assert!((largest - 0.1).abs() < 0.03, "{largest}");
+    }
+    // In the last it is as good as done.
+    let (stop, mut read) = (Arc::default(), 0);
+    let shapes = shapes::measure(&options, &wanted, &stop, |_| {
+        read += 1;
+        stop.store(read >= 150, Ordering::Relaxed);
+    });
+    let shapes = shapes.expect("shapes");
+    let said = shapes.notes.join("\n");
+    assert!(shapes.frames == 60 && !said.contains("stopped"), "{said}");
 }

@@ -32,7 +32,8 @@ use rowtone_plot::{Animation, Panel, Plate};
     enlarged; .npz is for NumPy, .unv (UFF 15, 55, 58, 82, 151, 164) for modal analysis.\n\n\
     The recording is read three times, so it must be a file. What --roi leaves to the program (auto)\n\
     is where tones are looked for; tiles cover the whole picture. Two tones whose sum or difference is\n\
-    a multiple of the frame rate cannot be told apart, and are refused.")]
+    a multiple of the frame rate cannot be told apart, and are refused. Ctrl-C and SIGTERM end the\n\
+    reading: the shapes are those of what was read until then; a second one ends the program.")]
 pub struct Args {
     #[command(flatten)]
     camera: CameraArgs,
@@ -113,7 +114,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let stop = crate::stop::on_signals();
     let progress = Progress::new(None);
     let options = args.camera.options();
-    let shapes = shapes::measure(&options, &wanted, &stop, || progress.step())?;
+    let shapes = shapes::measure(&options, &wanted, &stop, |frames| progress.step_of(frames))?;
     for note in &shapes.notes {
         progress.note(&format!("{}: {note}", options.name()));
     }

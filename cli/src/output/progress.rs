@@ -38,6 +38,11 @@ impl Progress {
 
     /// One frame more is done.
     pub fn step(&self) {
+        self.step_of(self.frames);
+    }
+
+    /// One frame more is done, of so many in all as they are known by now.
+    pub fn step_of(&self, frames: Option<u64>) {
         let mut state = self.state();
         state.done += 1;
         if !self.to_terminal {
@@ -48,7 +53,7 @@ impl Progress {
         // Work that is done at once needs no bar.
         if due(state.drawn.unwrap_or(self.start)) {
             let line = line(
-                self.frames,
+                frames,
                 state.done,
                 now.saturating_duration_since(self.start),
             );

@@ -168,7 +168,7 @@ fn measured(live: &Live) -> Result<Value, String> {
             times.clone(),
         )?)
     };
-    let shapes = shapes::measure_from(open, &wanted, || ()).map_err(|e| e.to_string())?;
+    let shapes = shapes::measure_from(open, &wanted, |_| ()).map_err(|e| e.to_string())?;
     let scale = report.report.um_per_px.map(f64::from);
     let mut objects = shapes.objects(scale);
     for object in &mut objects {

@@ -50,7 +50,7 @@ pub fn score(case: &Case) -> Result<Score, LabError> {
         known: Some(vec![tone]),
         ..Wanted::default()
     };
-    let shapes = shapes::measure_from(|| Ok(filmed.feed()?), &wanted, || ())?;
+    let shapes = shapes::measure_from(|| Ok(filmed.feed()?), &wanted, |_| ())?;
     let shape = shapes.shapes.first().ok_or(LabError::NoReport)?;
     Ok(compared(case, shape))
 }

@@ -3,6 +3,7 @@
 use rowtone::camera::Pixels;
 
 use super::error::{RecordingError, ShapesError};
+use super::readings::Readings;
 use rowtone_clip::{Feed, Frame, Rect};
 
 /// Of so many rows one is compared from frame to frame.
@@ -28,19 +29,24 @@ pub(super) struct Mean {
 }
 
 impl Mean {
-    /// Reads the recording to its end.
+    /// Reads the recording, as far as `readings` go.
     ///
     /// # Errors
     /// [`ShapesError`] of the input, and where there are too few frames.
-    pub(super) fn read(feed: &mut Feed, step: &mut impl FnMut()) -> Result<Self, ShapesError> {
+    pub(super) fn read(
+        feed: &mut Feed,
+        readings: &mut Readings<impl FnMut(Option<u64>)>,
+    ) -> Result<Self, ShapesError> {
         let (width, height) = feed.camera.size;
         let whole = Rect::whole(width, height);
         let mut picture = Picture::new(width * height);
         let mut differences = Vec::new();
         let mut before: Option<Frame> = None;
         let mut span_ns = [0; 2];
-        while let Some(frame) = feed.next_frame()? {
-            step();
+        while !readings.is_over()
+            && let Some(frame) = feed.next_frame()?
+        {
+            readings.frame();
             for y in 0..height {
                 picture.add(y * width, frame.pixels(&whole, y));
             }

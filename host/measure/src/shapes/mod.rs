@@ -11,6 +11,7 @@ mod error;
 mod fit;
 mod mean;
 mod pass;
+mod readings;
 pub mod tones;
 
 use std::sync::Arc;
@@ -25,6 +26,7 @@ use rowtone_clip::{CameraOptions, Feed, Rect};
 pub use self::error::{Alike, Hidden, RecordingError, ShapesError};
 
 use self::mean::Mean;
+use self::readings::Readings;
 use self::tones::{Findings, Found, Tones};
 
 /// What is wanted of a recording.
@@ -174,8 +176,9 @@ impl Shapes {
     }
 }
 
-/// Measures the shapes of a recording. `stop` ends it as if the recording ended there; `step` is called for every frame that
-/// was read, three times for each.
+/// Measures the shapes of a recording. Once `stop` is set no more of it is read than has been: the shapes are those of its
+/// first frames, and a note says so. `step` is called for every frame that is read, three times for each, with how many
+/// there will be where that is known.
 ///
 /// # Errors
 /// [`ShapesError`] for frequencies that cannot be told, for standard input, which cannot be read again, and where nothing
@@ -184,17 +187,12 @@ pub fn measure(
     options: &CameraOptions,
     wanted: &Wanted,
     stop: &Arc<AtomicBool>,
-    step: impl FnMut(),
+    step: impl FnMut(Option<u64>),
 ) -> Result<Shapes, ShapesError> {
     if options.is_pipe() {
         return Err(ShapesError::Pipe);
     }
-    let open = || {
-        let mut feed = Feed::open(options)?;
-        feed.stop_when(Arc::clone(stop));
-        Ok(feed)
-    };
-    measure_from(open, wanted, step)
+    measure_until(|| Ok(Feed::open(options)?), wanted, stop, step)
 }
 
 /// As [`measure`], of a recording that `open` opens anew for each reading.
@@ -204,25 +202,44 @@ pub fn measure(
 pub fn measure_from(
     open: impl Fn() -> Result<Feed, ShapesError>,
     wanted: &Wanted,
-    mut step: impl FnMut(),
+    step: impl FnMut(Option<u64>),
+) -> Result<Shapes, ShapesError> {
+    measure_until(open, wanted, &Arc::default(), step)
+}
+
+fn measure_until(
+    open: impl Fn() -> Result<Feed, ShapesError>,
+    wanted: &Wanted,
+    stop: &Arc<AtomicBool>,
+    step: impl FnMut(Option<u64>),
 ) -> Result<Shapes, ShapesError> {
     let feed = open()?;
     let (name, camera) = (feed.name.clone(), feed.camera.clone());
     let (width, height) = camera.size;
     let grid = Grid::new(width as u16, height as u16, wanted.tile_px).map_err(ShapesError::Grid)?;
+    let looked_for = wanted.known.is_none();
+    let mut readings = Readings::new(stop, feed.frames, 2 + u64::from(looked_for), step);
     let found = match &wanted.known {
         Some(tones) => Findings::known(tones.clone(), feed.notes),
-        None => tones::find(feed, wanted, &mut step)?,
+        None => {
+            let feed = readings.begin(feed);
+            let found = tones::find(feed, wanted, &mut || readings.frame())?;
+            readings.end();
+            found
+        }
     };
-    let mean = Mean::read(&mut open()?, &mut step)?;
+    let mean = Mean::read(&mut readings.begin(open()?), &mut readings)?;
+    readings.end();
     let mut tones = Tones::choose(&name, wanted, found, &camera, mean.seconds())?;
-    let run = |hz: &[f64], step: &mut dyn FnMut()| pass::run(&mut open()?, &mean, grid, hz, step);
-    let mut sums = run(&tones.hz(), &mut step)?;
+    tones.notes.extend(readings.note(mean.seconds()));
+    // Not more than the mean picture was made of is read again, and all of that, whatever comes: little time.
+    let mut run = |hz: &[f64]| pass::run(&mut open()?, &mean, grid, hz, &mut || readings.frame());
+    let mut sums = run(&tones.hz())?;
     // A frequency that was far off is set right and read again.
     if let Some(better) = fit::refined(&sums, &tones, &camera) {
         tones.set(&better);
         if fit::is_far(&sums, &tones) {
-            sums = run(&tones.hz(), &mut step)?;
+            sums = run(&tones.hz())?;
             if let Some(better) = fit::refined(&sums, &tones, &camera) {
                 tones.set(&better);
             }
