@@ -12,10 +12,11 @@ use super::window::WindowArgs;
 use crate::camera_args::CameraArgs;
 use crate::failure::Failure;
 use crate::output::Out;
+use crate::output::first_frame::FirstFrame;
 use crate::output::page::StillPage;
 use crate::output::progress::Progress;
 use crate::output::spectrum_csv::SpectrumFile;
-use rowtone_clip::Feed;
+use rowtone_clip::{Feed, Rect, Turn};
 use rowtone_files::WholeFile;
 use rowtone_measure::analysis::{Analysis, Event, Plan};
 use rowtone_measure::tracking::Shifts;
@@ -111,6 +112,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let settings = args.window.as_a_board_says(args.camera.um_per_px());
     let report = args.report.clone();
     let page = report.map(|path| StillPage::new(path, &mut feed, settings));
+    let first_frame = args.plot.is_some().then(|| FirstFrame::of(&mut feed));
     let plan = Plan::new(&feed.camera, &args.window.settings(args.camera.um_per_px()))?;
     let shifts = Shifts::start(feed, Some(plan.groups()))?;
     let picture = args.plot.clone().map(|path| {
@@ -141,6 +143,9 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         out: Out::default(),
         serial,
         picture,
+        first_frame,
+        turn: shifts.camera.turn,
+        given: shifts.camera.turn.back().size(width, height),
         spectrum,
         page,
         session,
@@ -202,6 +207,10 @@ struct Outlets {
     out: Out,
     serial: Option<Sender>,
     picture: Option<Picture>,
+    first_frame: Option<FirstFrame>,
+    /// What turns the given picture, and its size, px.
+    turn: Turn,
+    given: (usize, usize),
     spectrum: Option<SpectrumFile>,
     page: Option<StillPage>,
     session: u32,
@@ -311,7 +320,21 @@ impl Outlets {
     /// Says what the whole recording is, writes the picture and the page, and waits for the serial port.
     fn close(mut self) -> Result<(), Failure> {
         let summed = self.sum_up();
-        let drawn = self.picture.map_or(Ok(()), |picture| picture.save());
+        let [x, y, width, height] = self.place.roi;
+        let given = Rect {
+            x,
+            y,
+            width,
+            height,
+        };
+        let measured = self.turn.part(given, self.given.0, self.given.1);
+        let frame = self.first_frame.and_then(|first| first.with(measured));
+        let drawn = self.picture.map_or(Ok(()), |mut picture| {
+            if let Some(frame) = frame {
+                picture.photo(frame);
+            }
+            picture.save()
+        });
         let told = self.spectrum.map_or(Ok(()), SpectrumFile::save);
         let written = self.page.map_or(Ok(()), StillPage::save);
         let sent = self.serial.map_or(Ok(None), Sender::finish);

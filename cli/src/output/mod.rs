@@ -3,6 +3,7 @@
 //! Standard output carries results and nothing else. [`Out`] writes lines to it (or to a file), each
 //! flushed as it is complete, and turns a closed pipe into [`Failure::OutputClosed`].
 
+pub(crate) mod first_frame;
 pub(crate) mod npy;
 pub(crate) mod page;
 pub mod progress;

@@ -62,7 +62,7 @@ pub struct Feed {
     /// Columns and rows of a frame as it is stored.
     size: (usize, usize),
     stop: Option<Arc<AtomicBool>>,
-    onlooker: Option<Onlooker>,
+    onlookers: Vec<Onlooker>,
 }
 
 /// Who is shown every frame.
@@ -153,7 +153,7 @@ impl Feed {
             delivered: 0,
             size,
             stop: None,
-            onlooker: None,
+            onlookers: Vec::new(),
         })
     }
 
@@ -164,7 +164,7 @@ impl Feed {
 
     /// Shows every frame to `onlooker` too, before it is measured, on the thread that measures.
     pub fn show_to(&mut self, onlooker: impl FnMut(&Frame) + Send + 'static) {
-        self.onlooker = Some(Onlooker(Box::new(onlooker)));
+        self.onlookers.push(Onlooker(Box::new(onlooker)));
     }
 
     /// The next frame; `None` after the last.
@@ -194,7 +194,7 @@ impl Feed {
                 {
                     return Err(doubt.into());
                 }
-                if let Some(Onlooker(see)) = &mut self.onlooker {
+                for Onlooker(see) in &mut self.onlookers {
                     see(&frame);
                 }
                 Ok(Some(frame))

@@ -1,4 +1,4 @@
-//! The picture itself: spectrum above, displacement and spectrogram below.
+//! The picture itself: the frame and the list of tones above, the spectrum, displacement and spectrogram below.
 
 use plotters::coord::Shift;
 use plotters::coord::types::RangedCoordf64;
@@ -7,18 +7,23 @@ use rowtone::report::Report;
 
 use super::error::DrawError;
 use super::file::Drawing;
+use super::photo::Photo;
 use super::residual::Fit;
 use super::spectrogram::Spectrogram;
-use rowtone_report::text::digits;
+use super::{spectrum, tones};
 
 /// Size of the picture, px.
-pub(super) const SIZE: (u32, u32) = (1200, 860);
+pub(super) const SIZE: (u32, u32) = (1200, 1240);
 
 pub(super) const INK: RGBColor = RGBColor(38, 44, 52);
-const GRID: RGBColor = RGBColor(226, 230, 234);
-const FLOOR: RGBColor = RGBColor(120, 140, 160);
-const TONE: RGBColor = RGBColor(202, 60, 40);
-const ROWS: RGBColor = RGBColor(24, 92, 160);
+pub(super) const GRID: RGBColor = RGBColor(226, 230, 234);
+pub(super) const MUTED: RGBColor = RGBColor(112, 122, 134);
+pub(super) const TONE: RGBColor = RGBColor(202, 60, 40);
+/// Of what is along the rows, and down the columns.
+pub(super) const X_AXIS: RGBColor = RGBColor(24, 92, 160);
+pub(super) const Y_AXIS: RGBColor = RGBColor(30, 140, 90);
+/// Letters of the title.
+const TITLE: usize = 110;
 /// Shades of the spectrogram.
 const SHADES: i32 = 24;
 /// From dark to bright, perceptually even: the anchors of "viridis" (van der Walt & Smith 2015).
@@ -40,8 +45,12 @@ pub(super) struct Scene<'a> {
     pub report: &'a Report,
     /// The last window's samples.
     pub fit: &'a Fit,
-    /// Noise floor of the last window: frequencies, Hz, and amplitudes, px.
+    /// A frame of the recording.
+    pub photo: Option<&'a Photo>,
+    /// Noise floor of the last window along x: frequencies, Hz, and amplitudes, px.
     pub floor: &'a [(f64, f64)],
+    /// The same along y; nothing where that is not measured.
+    pub floor_y: &'a [(f64, f64)],
     /// Amplitudes over time.
     pub spectrogram: &'a Spectrogram,
     /// Frequencies of the spectrogram's rows, Hz.
@@ -64,10 +73,16 @@ impl Drawing for Scene<'_> {
         B::ErrorType: 'static,
     {
         root.fill(&WHITE)?;
-        let root = root.titled(self.title, font(20))?;
-        let (above, below) = root.split_vertically(430);
+        let root = root.titled(&short_title(self.title), font(20))?;
+        let (above, below) = root.split_vertically(380);
+        let (photo, list) = above.split_horizontally(if self.photo.is_some() { 480 } else { 70 });
+        if let Some(frame) = self.photo {
+            frame.draw(&photo, if self.floor_y.is_empty() { 1 } else { 2 })?;
+        }
+        tones::list(&list, self.report)?;
+        let (above, below) = below.split_vertically(430);
         let (left, right) = below.split_horizontally(600);
-        spectrum(&above, self)?;
+        spectrum::spectrum(&above, self)?;
         displacement(&left, self)?;
         spectrogram(&right, self)
     }
@@ -77,9 +92,26 @@ pub(super) fn font(size: u32) -> TextStyle<'static> {
     ("sans-serif", size).into_font().color(&INK)
 }
 
+/// The end of a title that is too long for the picture: where a file's own name is.
+fn short_title(title: &str) -> String {
+    let letters = title.chars().count();
+    if letters <= TITLE {
+        return title.to_owned();
+    }
+    format!(
+        "…{}",
+        title.chars().skip(letters - TITLE).collect::<String>()
+    )
+}
+
 /// Decades of px that hold the floor and the tones.
-fn amplitude_range(scene: &Scene<'_>) -> std::ops::Range<f64> {
-    let mut floor: Vec<f64> = scene.floor.iter().map(|point| point.1).collect();
+pub(super) fn amplitude_range(scene: &Scene<'_>) -> std::ops::Range<f64> {
+    let mut floor: Vec<f64> = scene
+        .floor
+        .iter()
+        .chain(scene.floor_y)
+        .map(|point| point.1)
+        .collect();
     floor.sort_by(f64::total_cmp);
     let low = floor
         .get(floor.len() / 4)
@@ -92,65 +124,6 @@ fn amplitude_range(scene: &Scene<'_>) -> std::ops::Range<f64> {
         .fold(low * 30.0, f64::max);
     let low = 10_f64.powf((low / 2.0).log10().floor());
     low..high * 3.0
-}
-
-fn spectrum<B>(area: &Area<B>, scene: &Scene<'_>) -> Drawn
-where
-    B: DrawingBackend,
-    B::ErrorType: 'static,
-{
-    let range = amplitude_range(scene);
-    let band = scene.band_hz;
-    let mut chart = ChartBuilder::on(area)
-        .caption(
-            "Spectrum of the last window: tones, and the noise below them",
-            font(16),
-        )
-        .margin(12)
-        .margin_right(28)
-        .x_label_area_size(42)
-        .y_label_area_size(70)
-        .build_cartesian_2d(band.0..band.1, range.clone().log_scale())?;
-    chart
-        .configure_mesh()
-        .light_line_style(WHITE)
-        .bold_line_style(GRID)
-        .axis_style(INK)
-        .label_style(font(14))
-        .axis_desc_style(font(15))
-        .x_desc("frequency, Hz")
-        .y_desc("amplitude, px")
-        .x_label_formatter(&|x| format!("{x:.0}"))
-        .y_label_formatter(&|y| digits(*y, 1))
-        .draw()?;
-    let floor = || {
-        scene
-            .floor
-            .iter()
-            .map(|&(hz, px)| (hz, px.max(range.start)))
-    };
-    chart.draw_series(AreaSeries::new(floor(), range.start, FLOOR.mix(0.25)))?;
-    chart.draw_series(LineSeries::new(floor(), FLOOR))?;
-    let mut labelled: Vec<(i32, i32)> = Vec::new();
-    for peak in &scene.report.peaks {
-        let (hz, px) = (f64::from(peak.hz), f64::from(peak.amplitude_px));
-        chart.draw_series([PathElement::new(
-            vec![(hz, range.start), (hz, px)],
-            TONE.stroke_width(2),
-        )])?;
-        chart.draw_series([Circle::new((hz, px), 4, TONE.filled())])?;
-        // The largest come first: a label that would cover an earlier one is left out.
-        let at = chart.backend_coord(&(hz, px));
-        let apart =
-            |other: &(i32, i32)| (other.0 - at.0).abs() > 150 || (other.1 - at.1).abs() > 16;
-        if labelled.iter().all(apart) {
-            labelled.push(at);
-            let label = format!("{:.2} Hz, {} px", peak.hz, digits(px, 3));
-            let place = EmptyElement::at((hz, px)) + Text::new(label, (8, -8), font(14));
-            chart.draw_series([place])?;
-        }
-    }
-    Ok(())
 }
 
 fn displacement<B>(area: &Area<B>, scene: &Scene<'_>) -> Drawn
@@ -171,7 +144,7 @@ where
         .fold(1e-4, f64::max)
         * 1.15;
     let mut chart = ChartBuilder::on(area)
-        .caption("Displacement, a few frames", font(16))
+        .caption("Displacement along the rows, a few frames", font(16))
         .margin(12)
         .margin_right(28)
         .x_label_area_size(42)
@@ -194,11 +167,11 @@ where
     }
     if scene.one_a_frame {
         let dots = points(&shown);
-        chart.draw_series(dots.into_iter().map(|p| Circle::new(p, 2, ROWS.filled())))?;
+        chart.draw_series(dots.into_iter().map(|p| Circle::new(p, 2, X_AXIS.filled())))?;
     } else {
         // Nothing is drawn over the blank time between frames.
         for frame in shown.chunk_by(|&a, &b| fit.frames[a] == fit.frames[b]) {
-            chart.draw_series(LineSeries::new(points(frame), ROWS.stroke_width(1)))?;
+            chart.draw_series(LineSeries::new(points(frame), X_AXIS.stroke_width(1)))?;
         }
     }
     Ok(())
@@ -243,7 +216,7 @@ where
     let end = scene.spectrogram.end_s.max(start + 1e-3);
     let band = scene.band_hz;
     let mut chart = ChartBuilder::on(area)
-        .caption("Amplitude over time and frequency", font(16))
+        .caption("Amplitude over time and frequency (dark: small)", font(16))
         .margin(12)
         .margin_right(28)
         .x_label_area_size(42)

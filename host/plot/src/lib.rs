@@ -1,4 +1,5 @@
-//! A recording as a picture: spectrum, displacement over a few frames, spectrogram.
+//! A recording as a picture: a frame with the part that is measured, the tones, spectra of both axes, displacement over
+//! a few frames, spectrogram.
 //!
 //! A [`Picture`] is shown every sample and every report and drawn at the end. It keeps the samples of
 //! one window and a bounded number of spectra, so it does not grow with the recording. A [`Plate`] shows the shapes of tones, an
@@ -11,18 +12,22 @@ mod error;
 mod file;
 mod film;
 mod glyphs;
+mod photo;
 mod plate;
 mod residual;
 mod spectrogram;
+mod spectrum;
+mod tones;
 
 use std::collections::VecDeque;
 use std::path::PathBuf;
 
-use rowtone::report::Report;
+use rowtone::report::{Peak, Report};
 use rowtone::timeline::Sample;
 
 pub use animation::Animation;
 pub use error::{DrawError, PlotError};
+pub use photo::Photo;
 pub use plate::{Panel, Phasors, Plate};
 
 pub use file::{Drawing, check_ending, png, svg, write};
@@ -62,6 +67,9 @@ pub struct Picture {
     samples: VecDeque<Sample>,
     spectrogram: Spectrogram,
     last: Option<(Report, Fit)>,
+    /// Of the same window along y, where that is measured.
+    last_y: Option<Fit>,
+    photo: Option<Photo>,
 }
 
 impl Picture {
@@ -73,12 +81,19 @@ impl Picture {
             samples: VecDeque::new(),
             spectrogram: Spectrogram::default(),
             last: None,
+            last_y: None,
+            photo: None,
         }
     }
 
     /// Says when the recording started, ns: reports count from there.
     pub fn start(&mut self, start_ns: i64) {
         self.start_ns.get_or_insert(start_ns);
+    }
+
+    /// Gives it a frame to show.
+    pub fn photo(&mut self, photo: Photo) {
+        self.photo = Some(photo);
     }
 
     /// Shows it a sample.
@@ -105,8 +120,10 @@ impl Picture {
             .take_while(|s| s.time_ns <= at(end_s + 1e-3))
             .copied()
             .collect();
-        let hz: Vec<f64> = report.peaks.iter().map(|p| p.hz.into()).collect();
-        let fit = Fit::new(&window, &hz);
+        let bends = |p: &Peak| p.motion.as_ref().is_some_and(|m| !m.rigid);
+        let tones = report.peaks.iter().map(|p| (p.hz.into(), bends(p)));
+        let tones: Vec<(f64, bool)> = tones.collect();
+        let fit = Fit::bending(&window, &tones);
         let mut column: Vec<f32> = self
             .floor(&fit, SPECTROGRAM_ROWS)
             .iter()
@@ -122,6 +139,8 @@ impl Picture {
         self.spectrogram.push(column);
         self.spectrogram.start_s.get_or_insert(start_s.max(0.0));
         self.spectrogram.end_s = end_s;
+        let down: Vec<Sample> = window.iter().filter_map(downwards).collect();
+        self.last_y = (!down.is_empty()).then(|| Fit::bending(&down, &tones));
         self.last = Some((report.clone(), fit));
     }
 
@@ -146,7 +165,13 @@ impl Picture {
         let Some((report, fit)) = &self.last else {
             return Ok(());
         };
+        let floor_y = self
+            .last_y
+            .as_ref()
+            .map(|fit| self.floor(fit, FLOOR_POINTS));
         let scene = draw::Scene {
+            photo: self.photo.as_ref(),
+            floor_y: floor_y.as_deref().unwrap_or_default(),
             title: &self.settings.title,
             report,
             fit,
@@ -157,4 +182,14 @@ impl Picture {
         };
         write(&self.settings.path, &scene)
     }
+}
+
+/// What a sample knows of the motion down the columns, as a sample of its own.
+fn downwards(sample: &Sample) -> Option<Sample> {
+    let vertical = sample.vertical.as_ref()?;
+    (vertical.information_per_px2 > 0.0).then_some(Sample {
+        shift_px: vertical.shift_px,
+        information_per_px2: vertical.information_per_px2,
+        ..*sample
+    })
 }

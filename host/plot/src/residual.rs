@@ -39,8 +39,15 @@ pub(super) struct Fit {
 }
 
 impl Fit {
-    /// Fits tones of these frequencies.
+    /// Fits tones of these frequencies, the same in all rows.
+    #[cfg(test)]
     pub(super) fn new(samples: &[Sample], hz: &[f64]) -> Self {
+        let tones: Vec<(f64, bool)> = hz.iter().map(|&hz| (hz, false)).collect();
+        Self::bending(samples, &tones)
+    }
+
+    /// Fits tones of these frequencies; of those that bend, amplitude and phase are parabolas over the slots.
+    pub(super) fn bending(samples: &[Sample], tones: &[(f64, bool)]) -> Self {
         let total: f64 = samples
             .iter()
             .map(|s| f64::from(s.information_per_px2))
@@ -64,7 +71,7 @@ impl Fit {
         fit.remove_means(&mut shifts);
         fit.shifts_px = shifts;
         fit.rest_px = fit.shifts_px.clone();
-        fit.fit_tones(hz);
+        fit.fit_tones(tones);
         fit
     }
 
@@ -84,14 +91,21 @@ impl Fit {
         }
     }
 
-    fn fit_tones(&mut self, hz: &[f64]) {
+    fn fit_tones(&mut self, tones: &[(f64, bool)]) {
+        let last = self.slots.iter().max().map_or(1, |&slot| slot.max(1)) as f64;
         let mut columns = Vec::new();
-        for &hz in hz {
-            for wave in [f64::cos, f64::sin] {
-                let mut column: Vec<f64> =
-                    self.times_s.iter().map(|t| wave(TAU * hz * t)).collect();
-                self.remove_means(&mut column);
-                columns.push(column);
+        let orders = |bends: bool| if bends { 3 } else { 1 };
+        for &(hz, bends) in tones {
+            for order in 0..orders(bends) {
+                for wave in [f64::cos, f64::sin] {
+                    let place = |slot: usize| (2.0 * slot as f64 / last - 1.0).powi(order);
+                    let values = self.times_s.iter().zip(&self.slots);
+                    let mut column: Vec<f64> = values
+                        .map(|(t, &slot)| place(slot) * wave(TAU * hz * t))
+                        .collect();
+                    self.remove_means(&mut column);
+                    columns.push(column);
+                }
             }
         }
         let product = |a: &[f64], b: &[f64]| -> f64 {
@@ -112,15 +126,16 @@ impl Fit {
                 *rest -= factor * value;
             }
         }
-        self.tones = hz
-            .iter()
-            .zip(factors.chunks_exact(2))
-            .map(|(&hz, factor)| Tone {
+        let mut from = 0;
+        for &(hz, bends) in tones {
+            // At the middle of the rows.
+            self.tones.push(Tone {
                 hz,
-                cosine: factor[0],
-                sine: factor[1],
-            })
-            .collect();
+                cosine: factors[from],
+                sine: factors[from + 1],
+            });
+            from += 2 * orders(bends) as usize;
+        }
     }
 
     /// The tones together at a time after the origin, px.
