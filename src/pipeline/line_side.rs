@@ -159,6 +159,11 @@ impl<'a> LineSide<'a> {
         &self.tracker
     }
 
+    /// Tells the tracker of the sensor's [fixed pattern](Tracker::set_fixed_pattern).
+    pub fn set_fixed_pattern(&mut self, share: f32) {
+        self.tracker.set_fixed_pattern(share);
+    }
+
     /// How bright the picture is, a running mean over some sixteen frames.
     pub const fn light(&self) -> Light {
         self.light

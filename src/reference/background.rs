@@ -188,7 +188,7 @@ impl Store<'_> {
                 column: 0,
             };
         }
-        let frames = 1.0 / self.keep_of(row);
+        let frames = self.recipe.noise_frames(1.0 / self.keep_of(row));
         let build = VerticalBuild::new(&self.recipe, frames, table, self.reach(row))
             .without(self.left_out(row));
         Work::BuildVertical { row, table, build }

@@ -24,6 +24,9 @@ const ENERGY_COLUMNS: usize = 2 * ENERGY_REACH + 1;
 /// Ring of the last squares: a power of two, so that a position is a mask away.
 const RING: usize = ENERGY_COLUMNS.next_power_of_two();
 
+/// The reference's own noise is at most that of so small a share of a frame.
+const LEAST_FRAMES: f32 = 1e-3;
+
 /// Whole shifts either way at which the phase-correlation function is taken.
 const LAGS: usize = SLOPE.len();
 
@@ -63,7 +66,7 @@ pub struct Build {
     recipe: Recipe,
     /// Columns of pixels that do not move with the row.
     left_out: [u16; LEFT_OUT],
-    /// How many frames the reference is the mean of.
+    /// Of how many frames a mean has as much noise as the reference.
     frames: f32,
     /// Pixel values in one reference count: a power of two, so that no bit differs from a division.
     per_count: f32,
@@ -118,12 +121,16 @@ impl Moments {
 }
 
 impl Build {
-    /// Begins a row. `frames`: how many frames its mean is the mean of, at least 1.
+    /// Begins a row. `frames`: of how many frames a mean has the noise of this one, above 0.
     pub fn new(recipe: &Recipe, frames: f32) -> Self {
         Self {
             recipe: *recipe,
             left_out: [NONE; LEFT_OUT],
-            frames: frames.max(1.0),
+            frames: if frames > LEAST_FRAMES {
+                frames
+            } else {
+                LEAST_FRAMES
+            },
             per_count: 1.0 / recipe.counts_per_value,
             step: Step::Weigh,
             column: 0,

@@ -251,6 +251,7 @@ mod tests {
                 dark: 1.0,
                 per_value: 0.0,
             },
+            pattern: 0.0,
             counts_per_value: 128.0,
             saturation: 254.0,
             kernel: Kernel::PORTABLE,

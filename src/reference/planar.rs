@@ -114,6 +114,7 @@ impl Store<'_> {
                 .get(row)
                 .map_or(1, RowLearning::frames),
         );
+        let frames = self.recipe.noise_frames(frames);
         let left_out = self.left_out(row);
         let b = &mut self.buffers;
         let Some(v) = &mut b.vertical else { return };

@@ -15,10 +15,21 @@ pub struct Recipe {
     pub margin_px: usize,
     /// Noise of one pixel.
     pub noise: PixelNoise,
+    /// Fixed pattern of the sensor: its variance as a share of that noise. It stands in the reference however many
+    /// frames that is the mean of. 0 where it is not known.
+    pub pattern: f32,
     /// Reference counts in one pixel value.
     pub counts_per_value: f32,
     /// Pixel value from which on a pixel is saturated.
     pub saturation: f32,
     /// Which implementation of the inner product.
     pub kernel: Kernel,
+}
+
+impl Recipe {
+    /// How many frames' mean would have as much noise as the reference has of its own, which is the mean of so many and
+    /// bears the fixed pattern as well.
+    pub(super) fn noise_frames(&self, frames: f32) -> f32 {
+        frames / (1.0 + self.pattern * frames)
+    }
 }

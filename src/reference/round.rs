@@ -14,6 +14,10 @@ const TRIAL_ROWS: usize = 24;
 /// had 32 false peaks where the finest was taken for a thousandth more, and none so.
 const AS_MUCH: f32 = 0.99;
 
+/// The same where the sensor's fixed pattern is known, which is white: the coarsest level passes a tenth of what the finest
+/// does, and how much that is, is known to a tenth.
+const AS_MUCH_BESIDE_PATTERN: f32 = 0.8;
+
 impl Store<'_> {
     /// Gives each row the mean brightness of its lines: that of the first frame, against which they were
     /// all brought, bears the pattern of a flickering lamp.
@@ -49,6 +53,10 @@ impl Store<'_> {
     pub(crate) fn choose_level(&mut self) {
         let rows = self.rows();
         let step = rows.div_ceil(TRIAL_ROWS).max(1);
+        let as_much = match self.recipe.pattern > 0.0 {
+            true => AS_MUCH_BESIDE_PATTERN,
+            false => AS_MUCH,
+        };
         let mut best = (0.0, Level::Medium);
         for level in Level::ALL {
             self.recipe.level = level;
@@ -58,7 +66,7 @@ impl Store<'_> {
                 let table = self.buffers.tables.get(row);
                 information += table.map_or(0.0, RowTable::information_per_px2);
             }
-            if information > best.0 * AS_MUCH {
+            if information > best.0 * as_much {
                 best = (information.max(best.0), level);
             }
         }

@@ -60,6 +60,11 @@ impl<'a> Store<'a> {
         self.recipe.noise = noise;
     }
 
+    /// From now on the sensor's fixed pattern has this share of the pixels' noise, as a variance.
+    pub(crate) fn set_pattern(&mut self, share: f32) {
+        self.recipe.pattern = share;
+    }
+
     /// From now on a pixel of the reference is saturated from this value on.
     pub(crate) fn set_saturation(&mut self, saturation: f32) {
         self.recipe.saturation = saturation;
@@ -199,7 +204,8 @@ impl<'a> Store<'a> {
     pub(super) fn build_of(&self, row: usize) -> Build {
         let learning = self.buffers.learning.get(row);
         let frames = learning.map_or(1, RowLearning::frames);
-        Build::new(&self.recipe, f32::from(frames)).without(self.left_out(row))
+        let frames = self.recipe.noise_frames(f32::from(frames));
+        Build::new(&self.recipe, frames).without(self.left_out(row))
     }
 
     /// Builds a row's coefficients from its mean, in one go, and those of its second product from the rows beside it.

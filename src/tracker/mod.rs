@@ -141,6 +141,7 @@ impl<'a> Tracker<'a> {
             stride: usize::from(config.stride),
             margin_px: 0,
             noise: PixelNoise::guess(values),
+            pattern: 0.0,
             counts_per_value: 32768.0 / values,
             saturation: config.saturation(),
             kernel: config.kernel,
@@ -213,6 +214,47 @@ impl<'a> Tracker<'a> {
         } else {
             self.curvature
         }
+    }
+
+    /// How rows become coefficients, as it was learned.
+    pub fn recipe(&self) -> &Recipe {
+        self.store.recipe()
+    }
+
+    /// A row of the reference picture, in [counts](Recipe::counts_per_value); `None` below the last.
+    pub fn reference(&self, row: u16) -> Option<&[u16]> {
+        self.store.mean(row.into())
+    }
+
+    /// Weight of each column, 255 for one that counts in full, 0 for one that sees nothing.
+    pub fn mask(&self) -> &[u8] {
+        self.store.mask()
+    }
+
+    /// How many frames a row of the reference is the mean of; 0 below the last.
+    pub fn learned_frames(&self, row: u16) -> u16 {
+        self.store
+            .learning(row.into())
+            .map_or(0, |row| row.frames())
+    }
+
+    /// The sensor's fixed pattern (unequal gains and offsets of its pixels: PRNU and DSNU of EMVA 1288, sections 4 and 8),
+    /// known from elsewhere: its variance as a share of the pixels' temporal noise's, 0 or greater. It does not move
+    /// with the picture, but looks like texture, and shifts would come out too small. All rows are built again; not for a
+    /// board that hurries.
+    pub fn set_fixed_pattern(&mut self, share: f32) {
+        let known = share > 0.0 && share.is_finite();
+        self.store.set_pattern(if known { share } else { 0.0 });
+        if self.config.level.is_none() {
+            self.store.choose_level();
+        }
+        self.store.build_all();
+        let usual_information = self.store.usual_information();
+        self.prediction.expect_information(usual_information);
+        if self.store.is_planar() {
+            self.planar.end_round(self.store.usual_curvatures_per_px2());
+        }
+        self.curvature = Curvature::of_per_px2(self.store.usual_curvature_per_px2());
     }
 
     /// What became of the lines so far.

@@ -285,6 +285,11 @@ impl Prediction {
         self.shift_px = self.gap.expected_px();
     }
 
+    /// Rows have been built again: what one with texture knows, 1/px².
+    pub(super) fn expect_information(&mut self, usual_information: f32) {
+        self.usual_information = usual_information;
+    }
+
     /// A swift picture will be here in the first row.
     #[cfg(feature = "long-exposure")]
     pub(super) fn foresee(&mut self, shift_px: f32) {

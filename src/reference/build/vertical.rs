@@ -153,8 +153,8 @@ impl VerticalBuild {
         self
     }
 
-    /// Begins a row whose first product has this table. `frames`: how many frames the reference is the mean of; `reach`: rows
-    /// of its colour on either side that are known.
+    /// Begins a row whose first product has this table. `frames`: of how many frames a mean has as much
+    /// noise as the reference; `reach`: rows of its colour on either side that are known.
     pub fn new(recipe: &Recipe, frames: f32, table: RowTable, reach: usize) -> Self {
         Self {
             build: Build::new(recipe, frames),

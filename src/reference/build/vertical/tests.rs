@@ -56,6 +56,7 @@ impl Row {
                 dark: noise * noise,
                 per_value: 0.0,
             },
+            pattern: 0.0,
             counts_per_value: 128.0,
             saturation: 254.0,
             kernel: Kernel::PORTABLE,
