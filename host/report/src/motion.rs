@@ -23,7 +23,8 @@ pub(crate) fn words(peak: &Peak) -> String {
     if let Some(decay_s) = motion.decay_s {
         words.push(format!("struck, falls to 1/e in {decay_s:.3} s"));
     }
-    if let Some(rate) = motion.hz_per_s {
+    // What is less reads 0.00.
+    if let Some(rate) = motion.hz_per_s.filter(|rate| rate.abs() >= 0.005) {
         let way = if rate > 0.0 { "rises" } else { "falls" };
         words.push(format!("{way} by {:.2} Hz/s", rate.abs()));
     }

@@ -75,7 +75,7 @@ fn correlation<P: Picture>(frames: &[P], part: &Rect) -> Option<f64> {
 }
 
 /// The frames without exact copies of the one before: those are no codec's work.
-fn distinct<'a, P: Picture>(frames: &'a [P], part: &Rect) -> Vec<&'a P> {
+pub(super) fn distinct<'a, P: Picture>(frames: &'a [P], part: &Rect) -> Vec<&'a P> {
     let differs = |a: &P, b: &P| (0..part.height).any(|y| a.row(part, y) != b.row(part, y));
     let first = frames.first().into_iter();
     let others = frames.windows(2).filter(|pair| differs(&pair[0], &pair[1]));
@@ -160,7 +160,7 @@ fn mean<P: Picture>(frames: &[&P], part: &Rect, y: usize) -> Vec<f32> {
     sum
 }
 
-fn values(row: Pixels<'_>) -> Vec<f32> {
+pub(super) fn values(row: Pixels<'_>) -> Vec<f32> {
     match row {
         Pixels::U8(row) => row.iter().map(|&value| f32::from(value)).collect(),
         Pixels::U16(row) => row.iter().map(|&value| f32::from(value)).collect(),

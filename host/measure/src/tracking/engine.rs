@@ -7,6 +7,7 @@ use rowtone::pipeline::{LineSide, Reading};
 use rowtone::timeline::{Displacement, Group};
 use rowtone::tracker::{Axes, Config, Outcome};
 
+use super::pattern;
 use crate::PartError;
 use rowtone_clip::{Frame, Rect};
 use rowtone_memory::TrackerMemory;
@@ -90,6 +91,15 @@ impl<'a> Engine<'a> {
     /// Ends a round of learning.
     pub fn end_round(&mut self) {
         self.lines.end_round();
+    }
+
+    /// What the sensor's fixed pattern takes of the motion, as it stands in these frames, is made good; the reference was
+    /// learned from the first of them.
+    pub fn mend_pattern(&mut self, frames: &[Frame]) {
+        let tracker = self.lines.tracker();
+        if let Some(share) = pattern::share(frames, &self.part, self.rows.clone(), tracker) {
+            self.lines.set_fixed_pattern(share);
+        }
     }
 
     /// A texture that repeats was read at another of its repetitions; not known without the feature `long-exposure`.

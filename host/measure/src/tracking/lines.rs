@@ -24,6 +24,9 @@ const CHOOSE_S: f64 = 0.5;
 const CHOOSE_FRAMES: usize = 256;
 /// The rows of a frame that is read in this time are measured together where a codec has been at them, ns.
 const BRIEF_NS: f64 = 4e6;
+/// Frames of a file that tell its sensor's pattern, and how many bytes of luma they take at most.
+const PATTERN_FRAMES: usize = 120;
+const PATTERN_BYTES: usize = 128 << 20;
 /// Frames of the first round.
 const ROUGH_FRAMES: usize = 10;
 /// Key frames that their own reference is learned from.
@@ -53,6 +56,7 @@ fn measure_all(
     let mut memory = memory_for(&part);
     let mut still_memory = feed.camera.background.as_ref().map(memory_for);
     let (kept, more) = keep_first(feed);
+    let early = &kept[..kept.len().min(to_choose_by(feed))];
     if kept.len() < 2 {
         more?;
         let name = feed.name.clone();
@@ -69,7 +73,7 @@ fn measure_all(
     )?;
     // A reference is learned from frames that follow each other.
     let first = &kept[..kept.len().min(LEARN_FRAMES)];
-    let choice = lines.learn_roughly_and_choose(&feed.camera, &kept, &part);
+    let choice = lines.learn_roughly_and_choose(&feed.camera, early, &part);
     let region = choice.region;
     lines.chosen = Some(Chosen {
         part: as_given(&region, &feed.camera),
@@ -92,7 +96,7 @@ fn measure_all(
         lines.learn_roughly(first);
     }
     lines.learn(first, 1);
-    if let Some(cut) = kept.iter().find(|frame| frame.is_cut()) {
+    if let Some(cut) = early.iter().find(|frame| frame.is_cut()) {
         return Err(feed.cut_short(cut).into());
     }
     // What a codec or a denoiser took shows in the part that is measured.
@@ -116,7 +120,7 @@ fn measure_all(
             let first = seen.y - part.y;
             let exposed = (feed.camera.timing, axes);
             let rows = first..first + seen.height;
-            Together::learn((columns, rows), exposed, groups, &kept)
+            Together::learn((columns, rows), exposed, groups, early)
         });
         // The few key frames of a high-speed recording of so few bits see too little of a period.
         let few = lines.together.is_some() && probe.is_some_and(Probe::is_sparse);
@@ -124,6 +128,9 @@ fn measure_all(
         if let Some(chosen) = &mut lines.chosen {
             chosen.keyed = keyed;
         }
+    } else {
+        // A codec leaves no pattern of the sensor's.
+        lines.mend_pattern(&kept);
     }
     let ended = lines.run(feed, kept, more, notes, to)?;
     let Some(Measured { warning, keys }) = ended else {
@@ -200,14 +207,24 @@ fn told(region: &Region, camera: &Camera) -> String {
     )
 }
 
-/// The frames to choose the part by and to learn from, and whether more follow.
-fn keep_first(feed: &mut Feed) -> (Vec<Frame>, Result<bool, ClipError>) {
-    let (width, height) = feed.camera.size;
+/// How many frames tell which part to measure, and the reference.
+fn to_choose_by(feed: &Feed) -> usize {
     let chooses = feed.camera.part.is_none() && feed.frames.is_some();
-    let wanted = match chooses {
+    match chooses {
         true => ((CHOOSE_S * feed.camera.fps) as usize).clamp(LEARN_FRAMES, CHOOSE_FRAMES),
         false => LEARN_FRAMES,
+    }
+}
+
+/// The frames to choose the part by, to learn from and to know the sensor's pattern by, and whether more follow.
+fn keep_first(feed: &mut Feed) -> (Vec<Frame>, Result<bool, ClipError>) {
+    let (width, height) = feed.camera.size;
+    // What comes through a pipe may be live, and does not wait.
+    let of_pattern = match feed.frames {
+        Some(_) => (PATTERN_BYTES / (width * height)).min(PATTERN_FRAMES),
+        None => 0,
     };
+    let wanted = to_choose_by(feed).max(of_pattern);
     let most = (LEARN_BYTES / (width * height)).clamp(2, wanted);
     let mut kept = Vec::new();
     while kept.len() < most {
@@ -324,6 +341,15 @@ impl<'a> Lines<'a> {
                 .step_by(step)
                 .for_each(|frame| engine.learn(frame));
             engine.end_round();
+        }
+    }
+
+    /// What the sensor's fixed pattern takes of the motion is made good.
+    fn mend_pattern(&mut self, kept: &[Frame]) {
+        let whole = kept.iter().take_while(|frame| !frame.is_cut()).count();
+        let engines = [Some(&mut self.moving), self.still.as_mut()];
+        for engine in engines.into_iter().flatten() {
+            engine.mend_pattern(&kept[..whole]);
         }
     }
 

@@ -11,6 +11,7 @@ mod background;
 mod codec;
 mod engine;
 mod lines;
+mod pattern;
 pub mod region;
 mod together;
 
