@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use crate::board::line;
 use crate::broker::{Broker, publish, subscribe};
-use crate::{JSON, config, dir, ports, rowtone, run};
+use crate::{JSON, config, dir, ports, rowtone, run, run_logged};
 
 /// Runs a program with these arguments in a directory; whether it did its work.
 fn done(dir: &Path, program: &str, arguments: &str) -> bool {
@@ -114,6 +114,65 @@ fn the_last_will() {
     assert_eq!(state(), "offline");
     assert!(gateway.0.wait().unwrap().success());
     drop(broker);
+    std::fs::remove_dir_all(dir).unwrap();
+}
+
+/// A board that speaks, falls silent, speaks again and is unplugged: each is an event, and who comes later finds the last
+/// of them, the last report and what Home Assistant wants to know.
+#[test]
+fn a_board_that_falls_silent_or_is_unplugged_is_an_event() {
+    let dir = dir("silent");
+    let Some(broker) = Broker::start(&dir, "allow_anonymous true") else {
+        return;
+    };
+    let (client, heard) = subscribe(broker.port, "plant/b0/state");
+    let object = |bytes: &[u8]| -> serde_json::Value { serde_json::from_slice(bytes).unwrap() };
+    let expect = |state: &str| {
+        let said = object(&next(&heard).1);
+        assert_eq!(
+            (&said["board"], &said["state"]),
+            (&"b0".into(), &state.into())
+        );
+        assert!(said["since_unix_ms"].as_u64().unwrap() > 1_700_000_000_000);
+        said["why"].as_str().unwrap_or_default().to_owned()
+    };
+    let (mut masters, slaves, names) = ports(1);
+    let json = format!("{JSON}\nretain = true\ndiscovery = \"homeassistant\"");
+    let config = config(&dir, &format!("port = {}", broker.port), &json, &names);
+    let text = std::fs::read_to_string(&config).unwrap() + "silent_s = 2\n";
+    std::fs::write(&config, text).unwrap();
+    let (gateway, log) = run_logged(&config, &[]);
+    masters[0].write_all(&line(0)).unwrap();
+    expect("online");
+    assert_eq!(expect("silent"), "no report for 2 s");
+    masters[0].write_all(&line(1)).unwrap();
+    expect("online");
+    drop((masters, slaves));
+    assert!(!expect("unplugged").is_empty());
+    drop(client);
+
+    let (_client, heard) = subscribe(broker.port, "plant/b0/#");
+    let kept: std::collections::BTreeMap<_, _> = (0..2).map(|_| next(&heard)).collect();
+    assert_eq!(object(&kept["plant/b0/state"])["state"], "unplugged");
+    assert_eq!(object(&kept["plant/b0/report"])["seq"], 1);
+    let (_client, heard) = subscribe(broker.port, "homeassistant/#");
+    // The broker goes on with what this client had asked for before.
+    let mut all = std::iter::repeat_with(|| next(&heard));
+    let (topic, device) = all.find(|(of, _)| !of.starts_with("plant/")).unwrap();
+    assert_eq!(topic, "homeassistant/device/rowtone-test-b0/config");
+    let velocity = &object(&device)["components"]["velocity"];
+    assert_eq!(velocity["state_topic"], "plant/b0/report");
+
+    // Each line has the time of day.
+    let said = std::fs::read_to_string(&log).unwrap();
+    assert!(said.contains("Z b0: silent: no report for 2 s"), "{said}");
+    for line in said.lines() {
+        let time = line
+            .strip_prefix("rowtone: 20")
+            .unwrap_or_else(|| panic!("{line}"));
+        assert_eq!(&time[8..9], "T", "{line}");
+    }
+    drop((gateway, broker));
     std::fs::remove_dir_all(dir).unwrap();
 }
 
@@ -249,6 +308,15 @@ fn sparkplug() {
     drop(gateway); // kill -9
     let death = expect("NDEATH/hall-2", None);
     assert_eq!(value(&death, "bdSeq"), born);
+    // Another gateway's births are told from those of the first.
+    let (_masters, _slaves, names) = ports(2);
+    let _gateway = run(&config(&dir, &settings, sparkplug, &names), &[]);
+    let birth = expect("NBIRTH/hall-2", Some(0));
+    let Some(Field::Number(field, number)) = born else {
+        panic!("{born:?}");
+    };
+    let next = Some(Field::Number(field, (number + 1) % 256));
+    assert_eq!(value(&birth, "bdSeq"), next);
     drop(broker);
     std::fs::remove_dir_all(dir).unwrap();
 }

@@ -9,6 +9,7 @@ use toml::Spanned;
 use super::error::GatewayError;
 use super::mqtt::packet::is_topic;
 use super::spool::record::MAX_NAME;
+use rowtone_report::zone::ZoneLimits;
 use rowtone_serial::port::PortName;
 
 /// What to read and where to send it.
@@ -52,6 +53,11 @@ pub enum Payload {
     Json {
         /// First part of the topic.
         topic: String,
+        /// The broker keeps the last report of each board for whoever subscribes later.
+        #[serde(default)]
+        retain: bool,
+        /// First part of the topics under which Home Assistant looks for devices, as a rule `homeassistant`.
+        discovery: Option<String>,
     },
     /// Sparkplug B, to `spBv1.0/GROUP/DDATA/NODE/BOARD`.
     Sparkplug {
@@ -84,7 +90,14 @@ pub struct Board {
     pub name: String,
     /// Where it is.
     pub port: PortName,
+    /// It is called silent when no report comes for so long, s.
+    pub silent_s: u32,
+    /// Where the zones of its machine begin: its reports then have one.
+    pub zone_limits: Option<ZoneLimits>,
 }
+
+/// Longer than any usual hop.
+const SILENT_S: u32 = 30;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -100,6 +113,31 @@ struct File {
 struct BoardEntry {
     name: Spanned<String>,
     port: Spanned<String>,
+    silent_s: Option<Spanned<u32>>,
+    machine: Option<Spanned<String>>,
+    zone_limits: Option<Spanned<String>>,
+}
+
+impl BoardEntry {
+    /// Where its machine's zones begin; an error has the place in the text, the key, and why.
+    fn zone_limits(&self) -> Result<Option<ZoneLimits>, (usize, &'static str, String)> {
+        let (limits, (key, at)) = match (&self.machine, &self.zone_limits) {
+            (None, None) => return Ok(None),
+            (Some(_), Some(limits)) => {
+                let why = "give this or board.machine, not both".to_owned();
+                return Err((limits.span().start, "board.zone_limits", why));
+            }
+            (Some(name), None) => (
+                ZoneLimits::of_machine(name.get_ref()),
+                ("board.machine", name.span().start),
+            ),
+            (None, Some(limits)) => (
+                limits.get_ref().parse(),
+                ("board.zone_limits", limits.span().start),
+            ),
+        };
+        limits.map(Some).map_err(|why| (at, key, why))
+    }
 }
 
 impl Config {
@@ -136,11 +174,21 @@ impl Config {
         let at = file.payload.span().start;
         let plain = |part: &str| is_topic(part) && !part.starts_with('$');
         match file.payload.get_ref() {
-            Payload::Json { topic } if !plain(topic) => {
+            Payload::Json { topic, .. } if !plain(topic) => {
                 return wrong(
                     at,
                     "payload.topic",
                     "give a topic without #, + and line ends, that does not start with $",
+                );
+            }
+            Payload::Json {
+                discovery: Some(prefix),
+                ..
+            } if !plain(prefix) => {
+                return wrong(
+                    at,
+                    "payload.discovery",
+                    "give the first part of a topic without #, +, as \"homeassistant\"",
                 );
             }
             Payload::Sparkplug { group, node }
@@ -179,6 +227,15 @@ impl Config {
         let (mut names, mut ports) = (BTreeSet::new(), BTreeSet::new());
         let mut boards = vec![];
         for entry in file.board.into_inner() {
+            let zone_limits = match entry.zone_limits() {
+                Ok(limits) => limits,
+                Err((at, key, why)) => return wrong(at, key, &why),
+            };
+            if let Some(silent_s) = entry.silent_s.as_ref().filter(|s| *s.get_ref() == 0) {
+                let at = silent_s.span().start;
+                return wrong(at, "board.silent_s", "give at least 1");
+            }
+            let silent_s = entry.silent_s.map_or(SILENT_S, Spanned::into_inner);
             let (name_at, port_at) = (entry.name.span().start, entry.port.span().start);
             let (name, port) = (entry.name.into_inner(), entry.port.into_inner());
             if !plain(&name) || name.contains(|c: char| c == '/' || c.is_whitespace()) {
@@ -206,7 +263,12 @@ impl Config {
                     &format!("{} is there twice", port.path),
                 );
             }
-            boards.push(Board { name, port });
+            boards.push(Board {
+                name,
+                port,
+                silent_s,
+                zone_limits,
+            });
         }
         let config = Self {
             broker: file.broker,
@@ -225,8 +287,14 @@ impl Config {
         let longest = "x".repeat(MAX_NAME);
         let client_id = &self.broker.client_id;
         match &self.payload {
-            Payload::Json { topic } => {
+            Payload::Json {
+                topic, discovery, ..
+            } => {
+                // A device has both names in its own, with up to eight letters for one.
+                let device = format!("rowtone-{}-{}", client_id.repeat(8), longest.repeat(8));
+                let prefix = discovery.as_deref().unwrap_or("x");
                 is_topic(&format!("{topic}/{longest}/report"))
+                    && is_topic(&format!("{prefix}/device/{device}/config"))
                     && is_topic(&format!("{topic}/gateway/{client_id}/state"))
             }
             Payload::Sparkplug { group, node } => {
@@ -278,6 +346,11 @@ port = "/dev/ttyUSB1"
         let config = Config::parse(RIGHT).unwrap();
         assert_eq!(config.boards[0].port.baud, 921_600);
         assert_eq!((config.boards.len(), config.spool.max_mb), (2, 1000));
+        assert_eq!(config.boards[1].silent_s, 30);
+        let more = "name = \"press-4\"\nsilent_s = 120\nmachine = \"iso10816-1:class2\"";
+        let config = Config::parse(&RIGHT.replace("name = \"press-4\"", more)).unwrap();
+        assert_eq!(config.boards[1].silent_s, 120);
+        assert_eq!(config.boards[1].zone_limits.map(|z| z.zone(3.0)), Some('C'));
     }
 
     #[test]
@@ -313,6 +386,26 @@ port = "/dev/ttyUSB1"
                 "19: board.port: /dev/ttyUSB0 is there twice",
             ),
             ("ttyUSB1", "ttyUSB1:0", "19: board.port: "),
+            (
+                "name = \"press-4\"",
+                "name = \"press-4\"\nsilent_s = 0",
+                "19: board.silent_s: give at least 1",
+            ),
+            (
+                "name = \"press-4\"",
+                "name = \"press-4\"\nmachine = \"toaster\"",
+                "19: board.machine: want one of iso20816-3:group1:rigid",
+            ),
+            (
+                "name = \"press-4\"",
+                "machine = \"iso10816-1:class2\"\nzone_limits = \"1,2,3\"\nname = \"press-4\"",
+                "19: board.zone_limits: give this or board.machine",
+            ),
+            (
+                "topic = \"plant/vibration\"",
+                "topic = \"plant/vibration\"\ndiscovery = \"#\"",
+                "6: payload.discovery: ",
+            ),
             (
                 "dir = \"/var/lib/rowtone\"",
                 "dir = \"x\"\nmax_mb = 0",

@@ -6,12 +6,15 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender};
 use std::time::{Duration, Instant};
 
 use super::broker::{Address, Retry};
-use super::config::Config;
+use super::config::{Config, Payload};
 use super::delivery::{Delivery, Suspect, Verdict};
+use super::log::say;
 use super::mqtt::connection::{Client, Loss, Note};
 use super::mqtt::packet::{self, DISCONNECT, Message};
 use super::speech::Speech;
+use super::spool::births::Births;
 use super::spool::{Mark, Spool};
+use super::watch::Watch;
 use super::{Input, Totals, sparkplug, unix_ms};
 use rowtone_serial::receiver::Counters;
 
@@ -55,6 +58,8 @@ pub(super) struct Hub<'a> {
     passed_over_at: Option<Instant>,
     /// Boards whose line has gone, and of which the broker has not been told.
     gone: BTreeSet<String>,
+    watch: Watch,
+    births: Births,
     counters: Vec<Counters>,
 }
 
@@ -86,6 +91,8 @@ impl<'a> Hub<'a> {
             rebirth_at: now,
             passed_over_at: None,
             gone: BTreeSet::new(),
+            watch: Watch::new(&config.boards, now),
+            births: Births::read(&config.spool.dir),
             counters: vec![Counters::default(); config.boards.len()],
         }
     }
@@ -114,6 +121,7 @@ impl<'a> Hub<'a> {
                 save_at = now + SAVE;
             }
             self.say_notices();
+            self.hear_silence(now);
             self.keep_connected(now);
             self.send(now);
             match inputs.recv_timeout(Duration::from_millis(100)) {
@@ -133,7 +141,14 @@ impl<'a> Hub<'a> {
 
     fn take(&mut self, input: Input) {
         match input {
-            Input::Report(entry) => self.spool.push(&entry),
+            Input::Report(entry) => {
+                self.spool.push(&entry);
+                let board = &entry.board;
+                if self.watch.heard(board, Instant::now(), unix_ms()) {
+                    self.gone.remove(board);
+                    self.say_standing(board);
+                }
+            }
             Input::Counted(index, counters, complete) => {
                 if let Some(slot) = self.counters.get_mut(index) {
                     *slot = counters;
@@ -147,6 +162,13 @@ impl<'a> Hub<'a> {
                 let Some(board) = self.config.boards.get(index) else {
                     return;
                 };
+                let now = Instant::now();
+                if self
+                    .watch
+                    .line(&board.name, gone.as_deref(), now, unix_ms())
+                {
+                    self.say_standing(&board.name);
+                }
                 match gone {
                     None => {
                         self.gone.remove(&board.name);
@@ -203,7 +225,11 @@ impl<'a> Hub<'a> {
             return;
         }
         self.connection += 1;
-        let will = self.speech.begin(self.connection);
+        let number = match self.config.payload {
+            Payload::Sparkplug { .. } => self.births.count_on(),
+            Payload::Json { .. } => 0,
+        };
+        let will = self.speech.begin(number);
         match self.address.connect(self.connection, &will, &self.to) {
             Ok(client) => self.client = Some(client),
             Err(error) => {
@@ -255,6 +281,39 @@ impl<'a> Hub<'a> {
         }
         let hello = self.speech.hello(unix_ms());
         self.publish(&hello, None, now);
+        for board in &self.config.boards {
+            if let Some(device) = self.speech.discovery(board) {
+                self.publish(&device, None, now);
+            }
+        }
+        let known = self.watch.known();
+        let standings: Vec<_> = known
+            .filter_map(|(board, standing)| self.speech.standing(board, standing))
+            .collect();
+        for standing in standings {
+            self.publish(&standing, None, now);
+        }
+    }
+
+    /// Tells of a board that has changed its state.
+    fn say_standing(&mut self, board: &str) {
+        let Some(standing) = self.watch.of(board) else {
+            return;
+        };
+        let message = self.speech.standing(board, standing);
+        if let (Some(message), true) = (message, self.connected) {
+            self.publish(&message, None, Instant::now());
+        }
+    }
+
+    /// Tells of boards that have fallen silent.
+    fn hear_silence(&mut self, now: Instant) {
+        for board in self.watch.silent(now, unix_ms()) {
+            let why = self.watch.of(&board).and_then(|s| s.why.clone());
+            say(&format!("{board}: silent: {}", why.unwrap_or_default()));
+            self.say_standing(&board);
+            self.gone.insert(board);
+        }
     }
 
     /// Ends the connection in peace.
@@ -347,9 +406,4 @@ impl<'a> Hub<'a> {
             waiting: self.spool.waiting(),
         }
     }
-}
-
-/// One line for whoever watches.
-fn say(line: &str) {
-    eprintln!("rowtone: {line}");
 }

@@ -4,21 +4,25 @@
 //! Every report goes to disk (`spool`) before it is sent, and leaves it when the broker has
 //! acknowledged it (QoS 1) and can be believed (`delivery`), so neither a broker nor a gateway that
 //! is killed loses any. One loop (`hub`) owns the spool and the connection (`mqtt`) and takes all
-//! that happens as `Input`s; `speech` knows topics and payloads, `broker` when to try again.
+//! that happens as `Input`s; `speech` knows topics and payloads, `broker` when to try again, `watch`
+//! which boards speak.
 //! `docs/gateway.md` is for whoever sets it up.
 
 mod broker;
 mod config;
 mod delivery;
+mod discovery;
 mod error;
 mod files;
 mod hub;
 mod lines;
+mod log;
 pub mod mqtt;
 mod payload;
 mod sparkplug;
 mod speech;
 pub mod spool;
+mod watch;
 
 use std::sync::atomic::AtomicBool;
 use std::sync::mpsc::channel;

@@ -67,25 +67,25 @@ fn metric(name: impl Into<String>, datatype: u32, value: Option<Value>) -> Metri
     }
 }
 
-/// Number of the connection, in the birth of a node and in its death.
-pub(super) fn bd_seq(connection: u64) -> Metric {
-    metric("bdSeq", INT64, Some(Value::Long(connection % 256)))
+/// What births and deaths of a node count, 0 to 255: the same in the birth and in the death that belongs to it.
+pub(super) fn bd_seq(number: u64) -> Metric {
+    metric("bdSeq", INT64, Some(Value::Long(number % 256)))
 }
 
 /// The node's death: the broker sends it when the gateway is gone.
-pub(super) fn node_death(connection: u64) -> Vec<u8> {
+pub(super) fn node_death(number: u64) -> Vec<u8> {
     Payload {
         timestamp: None,
-        metrics: vec![bd_seq(connection)],
+        metrics: vec![bd_seq(number)],
         seq: None,
     }
     .encode_to_vec()
 }
 
 /// The node's birth, number 0 of its messages.
-pub(super) fn node_birth(connection: u64, unix_ms: u64) -> Vec<u8> {
+pub(super) fn node_birth(number: u64, unix_ms: u64) -> Vec<u8> {
     let rebirth = metric(REBIRTH, BOOLEAN, Some(Value::Boolean(false)));
-    let metrics = vec![bd_seq(connection), rebirth];
+    let metrics = vec![bd_seq(number), rebirth];
     Payload {
         timestamp: Some(unix_ms),
         metrics,

@@ -1,11 +1,14 @@
 //! What is said to the broker besides when: topics and payloads of either format.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
-use super::config::{Config, Payload};
+use super::config::{Board, Config, Payload};
+use super::discovery::{self, Topics};
 use super::mqtt::packet::Message;
 use super::spool::record::Entry;
+use super::watch::Standing;
 use super::{payload, sparkplug};
+use rowtone_report::zone::ZoneLimits;
 
 /// Older reports are marked as historical (Sparkplug).
 const HISTORICAL_MS: u64 = 10_000;
@@ -15,8 +18,10 @@ const HISTORICAL_MS: u64 = 10_000;
 pub(super) struct Speech {
     payload: Payload,
     client_id: String,
-    /// Number of the connection.
-    connection: u64,
+    /// Where the zones of boards' machines begin, by name.
+    zone_limits: BTreeMap<String, ZoneLimits>,
+    /// Number of the node's birth and death (Sparkplug).
+    bd_seq: u64,
     /// Boards whose birth was said (Sparkplug).
     births: BTreeSet<String>,
     /// Number of the last message of the node (Sparkplug).
@@ -28,15 +33,21 @@ impl Speech {
         Self {
             payload: config.payload.clone(),
             client_id: config.broker.client_id.clone(),
-            connection: 0,
+            zone_limits: {
+                let each = config.boards.iter();
+                each.filter_map(|b| Some((b.name.clone(), b.zone_limits?)))
+                    .collect()
+            },
+            bd_seq: 0,
             births: BTreeSet::new(),
             seq: 0,
         }
     }
 
-    /// A new connection begins: what the broker is to say when the gateway dies.
-    pub(super) fn begin(&mut self, connection: u64) -> Message {
-        self.connection = connection;
+    /// A new connection begins: what the broker is to say when the gateway dies. `bd_seq` is what births and deaths of the
+    /// node count.
+    pub(super) fn begin(&mut self, bd_seq: u64) -> Message {
+        self.bd_seq = bd_seq;
         self.births.clear();
         self.goodbye()
     }
@@ -54,9 +65,9 @@ impl Speech {
         self.births.clear();
         self.seq = 0;
         match &self.payload {
-            Payload::Json { topic } => self.state(topic, "online"),
+            Payload::Json { topic, .. } => self.state(topic, "online"),
             Payload::Sparkplug { .. } => {
-                let birth = sparkplug::node_birth(self.connection, unix_ms);
+                let birth = sparkplug::node_birth(self.bd_seq, unix_ms);
                 self.node("NBIRTH", birth)
             }
         }
@@ -65,20 +76,19 @@ impl Speech {
     /// The last one. The will is for a gateway that dies; one that ends says so itself.
     pub(super) fn goodbye(&self) -> Message {
         match &self.payload {
-            Payload::Json { topic } => self.state(topic, "offline"),
-            Payload::Sparkplug { .. } => {
-                self.node("NDEATH", sparkplug::node_death(self.connection))
-            }
+            Payload::Json { topic, .. } => self.state(topic, "offline"),
+            Payload::Sparkplug { .. } => self.node("NDEATH", sparkplug::node_death(self.bd_seq)),
         }
     }
 
     /// A report, after the board's birth where it needs one.
     pub(super) fn report(&mut self, entry: &Entry, unix_ms: u64) -> (Option<Message>, Message) {
-        if let Payload::Json { topic } = &self.payload {
+        if let Payload::Json { topic, retain, .. } = &self.payload {
+            let limits = self.zone_limits.get(&entry.board);
             let said = Message {
                 topic: format!("{topic}/{}/report", entry.board),
-                payload: payload::json(entry),
-                retain: false,
+                payload: payload::json(entry, limits),
+                retain: *retain,
             };
             return (None, said);
         }
@@ -98,6 +108,41 @@ impl Speech {
         self.births.remove(board).then(|| {
             let payload = sparkplug::board_death(self.next_seq(), unix_ms);
             self.board("DDEATH", board, payload)
+        })
+    }
+
+    /// Whether a board speaks: an event, and kept by the broker for whoever comes later. Sparkplug has births and deaths for
+    /// that.
+    pub(super) fn standing(&self, board: &str, standing: &Standing) -> Option<Message> {
+        let Payload::Json { topic, .. } = &self.payload else {
+            return None;
+        };
+        Some(Message {
+            topic: format!("{topic}/{board}/state"),
+            payload: payload::standing(board, standing),
+            retain: true,
+        })
+    }
+
+    /// What Home Assistant is told of a board, where it is to be told.
+    pub(super) fn discovery(&self, board: &Board) -> Option<Message> {
+        let Payload::Json {
+            topic,
+            discovery: Some(prefix),
+            ..
+        } = &self.payload
+        else {
+            return None;
+        };
+        let topics = Topics {
+            topic,
+            client_id: &self.client_id,
+        };
+        let (topic, payload) = discovery::device(prefix, topics, board);
+        Some(Message {
+            topic,
+            payload: payload.into_bytes(),
+            retain: true,
         })
     }
 
@@ -125,7 +170,7 @@ impl Speech {
     fn sparkplug(&self, kind: &str, board: &str, payload: Vec<u8>) -> Message {
         let topic = match &self.payload {
             Payload::Sparkplug { group, node } => format!("spBv1.0/{group}/{kind}/{node}{board}"),
-            Payload::Json { topic } => topic.clone(),
+            Payload::Json { topic, .. } => topic.clone(),
         };
         Message {
             topic,
@@ -146,7 +191,8 @@ mod tests {
                 node: "n".to_owned(),
             },
             client_id: "c".to_owned(),
-            connection: 0,
+            zone_limits: BTreeMap::new(),
+            bd_seq: 0,
             births: BTreeSet::new(),
             seq: 0,
         }

@@ -14,6 +14,7 @@
 //! - **Whatever is lost** is counted and said when it happens (`losses`).
 //! - **One gateway**: the directory is locked for as long as it is open.
 
+pub(crate) mod births;
 mod lane;
 mod losses;
 mod name;
@@ -458,7 +459,10 @@ fn list(dir: &Path) -> io::Result<(Files, u32)> {
             (Some((board, first)), Some(meta)) => {
                 files.entry(board).or_default().insert(first, meta.len());
             }
-            _ if matches!(name, "lock" | "state.0" | "state.1" | "aside") => {}
+            _ if matches!(
+                name,
+                "lock" | "state.0" | "state.1" | "aside" | "births" | "births.new"
+            ) => {}
             _ => strays += 1,
         }
     }
