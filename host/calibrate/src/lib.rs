@@ -15,7 +15,7 @@
 //! | [`rows`] | pictures to row means |
 //! | [`search`] | first guess of the stripes |
 //! | [`model`], [`fit`], `uncertainty` | the least-squares fit, and how sure it is |
-//! | [`stripes`] | which fit is believed; `outliers`: failed flashes; `fundamental`: uneven ones |
+//! | [`stripes`] | which fit is believed; `outliers`: failed flashes; `fundamental`: uneven ones; `finer`: two patterns; `bad`: single frames |
 //! | [`frames`] | frame period, direction |
 //! | [`exposure`], `simplex` | exposure of a row |
 //! | [`unknown`] | a light of unknown frequency |
@@ -24,8 +24,10 @@
 //! | [`plot`] | the stripes and the fit, drawn |
 //! | [`mod@file`] | the result as TOML |
 
+mod bad;
 pub mod exposure;
 pub mod file;
+mod finer;
 pub mod fit;
 pub mod frames;
 mod fundamental;
@@ -100,7 +102,8 @@ pub fn calibrate_with_stripes(
     {
         return Err(Refusal::LightHz { hz });
     }
-    let stripes = stripes::find(&recording.rows, most_harmonics)?;
+    let stripes = stripes::find(&recording.rows, most_harmonics);
+    let (stripes, is_over_another) = of_the_light(recording, light, stripes, most_harmonics)?;
     let fit = &stripes.fit;
     let used_rows = fit.gain.len();
     // A part of the picture tells the line time; read-out and blank time are those of all its rows.
@@ -141,7 +144,65 @@ pub fn calibrate_with_stripes(
         duty,
         is_light: true,
     };
-    conclude(recording, source, stripes)
+    let (mut calibration, stripes) = conclude(recording, source, stripes)?;
+    if is_over_another {
+        calibration.warnings.push(
+            "a coarser pattern lies over the light's stripes (other lights?) and was taken out: the finer one is the light's"
+                .to_owned(),
+        );
+    }
+    Ok((calibration, stripes))
+}
+
+/// Of two patterns that lie over each other, the one whose read-out fits into a frame as the light's; and whether it is
+/// the finer one.
+fn of_the_light(
+    recording: &Recording,
+    light: Light,
+    stripes: Result<Stripes, Refusal>,
+    most_harmonics: usize,
+) -> Result<(Stripes, bool), Refusal> {
+    let Light::Known {
+        hz, duty: Some(_), ..
+    } = light
+    else {
+        return stripes.map(|stripes| (stripes, false));
+    };
+    let all = recording.rows.first().map_or(0, Vec::len);
+    let rows = recording.picture_rows.unwrap_or(all) as f64;
+    let fits = |per_row: f64| {
+        let share = recording
+            .frame_period_s()
+            .map(|period| per_row * rows / hz / period);
+        let can_be = unknown::SHORTEST_READOUT..1.0 + frames::CLOCK_TOLERANCE;
+        share.is_none_or(|share| can_be.contains(&share))
+    };
+    let stripes = match stripes {
+        Ok(stripes) => stripes,
+        Err(refusal) => {
+            // The finer pattern may be too strong for the coarser one to be met.
+            let alone = finer::over_a_coarser(&recording.rows)
+                .filter(|(coarser, finer)| !fits(*coarser) && fits(*finer))
+                .and_then(|(_, finer)| finer::alone(&recording.rows, finer, most_harmonics));
+            return alone.map(|stripes| (stripes, true)).ok_or(refusal);
+        }
+    };
+    let Some(finer) = finer::pattern(&stripes.fit) else {
+        return Ok((stripes, false));
+    };
+    match (fits(stripes.fit.model.per_row), fits(finer)) {
+        (true, false) => return Ok((stripes, false)),
+        (false, true) => {
+            if let Some(alone) = finer::alone(&recording.rows, finer, most_harmonics) {
+                return Ok((alone, true));
+            }
+        }
+        _ => {}
+    }
+    Err(Refusal::TwoPatterns {
+        periods: stripes.fit.model.per_row * rows,
+        finer: finer * rows,
+    })
 }
 
 /// What was found of the light (or of the machine tone).

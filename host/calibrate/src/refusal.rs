@@ -55,6 +55,13 @@ pub enum Refusal {
         /// By how much, against the stripes' own amplitude.
         share: f64,
     },
+    /// Two patterns lie over each other, and either may be the light's.
+    TwoPatterns {
+        /// Periods of the coarser in a frame.
+        periods: f64,
+        /// Periods of the finer.
+        finer: f64,
+    },
     /// The read-out would be longer than the frame period.
     ReadoutTooLong {
         /// Read-out time, s.
@@ -119,6 +126,11 @@ impl fmt::Display for Refusal {
                 f,
                 "stripes repeat only every {divisor} (they differ by {:.0} %): the light flashes unevenly, its true frequency may be 1/{divisor} of the stripes'",
                 100.0 * share
+            ),
+            Self::TwoPatterns { periods, finer } => write!(
+                f,
+                "two patterns lie over each other, of {periods:.1} and of {finer:.1} stripes a frame: put out other lights, or \
+                 give the frame rate (--fps) to tell which is the light's"
             ),
             Self::ReadoutTooLong { readout_s, frame_period_s } => write!(
                 f,

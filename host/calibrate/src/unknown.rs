@@ -10,7 +10,7 @@ use super::frames::Rolling;
 use std::f64::consts::TAU;
 
 /// The shortest read-out that is believed, part of the frame period.
-const SHORTEST_READOUT: f64 = 0.1;
+pub(super) const SHORTEST_READOUT: f64 = 0.1;
 
 /// The light, found.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use crate::failure::Failure;
 use crate::quantity::hertz;
 use pictures::{each_picture, full_scale};
+use rowtone_calibrate::file::RollingName;
 use rowtone_calibrate::rows::{Collector, Recording};
 use rowtone_calibrate::stripes::Stripes;
 use rowtone_calibrate::tone::motion::Watcher;
@@ -171,7 +172,9 @@ pub fn run(args: &Args) -> Result<(), Failure> {
 /// Calibrates by the stripes of a light.
 fn from_light(args: &Args, name: &str) -> Result<Found, Failure> {
     let mut collector = None;
+    let mut columns = Vec::new();
     let info = each_picture(args, |picture, width| {
+        columns.push(column_means(picture, width));
         collector
             .get_or_insert_with(|| Collector::new(width, full_scale(picture)))
             .push(picture.chunks_exact(width));
@@ -184,9 +187,52 @@ fn from_light(args: &Args, name: &str) -> Result<Found, Failure> {
         picture_rows: info.picture_rows,
         ..collector.finish(info.times_s, info.fps)
     };
-    let found = calibrate_with_stripes(&recording, light(args))
-        .map_err(|refusal| Failure::input(format!("{name}: {refusal}")))?;
+    let turned = Recording {
+        rows: columns,
+        picture_rows: None,
+        ..recording.clone()
+    };
+    let (recording, bad) = recording.without_bad_frames();
+    let mut found = calibrate_with_stripes(&recording, light(args)).map_err(|refusal| {
+        let hint = turned_hint(args, turned);
+        Failure::input(format!("{name}: {refusal}{hint}"))
+    })?;
+    if bad > 0 {
+        let warning = format!("frames unlike all others were left out: {bad}");
+        found.0.warnings.push(warning);
+    }
     Ok((recording, found))
+}
+
+fn column_means(picture: &[u16], width: usize) -> Vec<f64> {
+    let mut sums = vec![0.0; width];
+    for row in picture.chunks_exact(width) {
+        let values = sums.iter_mut().zip(row);
+        values.for_each(|(sum, &value)| *sum += f64::from(value));
+    }
+    let rows = (picture.len() / width).max(1) as f64;
+    sums.iter().map(|sum| sum / rows).collect()
+}
+
+/// What to do where stripes run along the columns: the picture was turned.
+fn turned_hint(args: &Args, turned: Recording) -> String {
+    let (turned, _) = turned.without_bad_frames();
+    let Ok((found, _)) = calibrate_with_stripes(&turned, light(args)) else {
+        return String::new();
+    };
+    // By a quarter clockwise the left column becomes the top row.
+    let [one, other] = match args.rotate {
+        Turn::No => ["90", "270"],
+        Turn::Half => ["270", "90"],
+        Turn::Quarter => ["180", "0"],
+        Turn::ThreeQuarters => ["0", "180"],
+    };
+    let rotate = match found.rolling {
+        Some(RollingName::Down) => format!("--rotate {one}"),
+        Some(RollingName::Up) => format!("--rotate {other}"),
+        None => format!("--rotate {one} or {other}"),
+    };
+    format!("; the stripes run from top to bottom here: the picture was turned, give {rotate}")
 }
 
 /// Calibrates by a tone in the motion: as stripes where it passes through periods in a frame, else by its slant.
