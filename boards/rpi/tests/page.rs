@@ -77,6 +77,22 @@ fn the_page_shows_the_camera_and_changes_what_is_measured() {
     }
     let (_, clip) = ask(&address, "GET /api/clip.y4m", "", "");
     assert!(clip.starts_with(b"YUV4MPEG2 W160 H120 F60000:1000 "));
+    // The camera's pictures become shapes: all of it moves alike at its larger tone, by 0.4 px along the rows.
+    let shapes = loop {
+        let (status, body) = ask(&address, "GET /api/shapes", "", "");
+        let text = String::from_utf8(body).unwrap();
+        if status == 200 && text.contains("\"hz\":97.") {
+            break text;
+        }
+        assert!(began.elapsed() < PATIENCE, "{text}");
+        std::thread::sleep(std::time::Duration::from_millis(200));
+    };
+    let first = shapes.split("\"moves\":").nth(1).unwrap();
+    let moves = first.split(']').next().unwrap();
+    assert!(
+        moves.contains("true") && !moves.contains("false"),
+        "{shapes}"
+    );
     let (status, _) = ask(
         &address,
         "PUT /api/settings",
