@@ -11,7 +11,7 @@ Exit status 1, and what differed, where anything does.
 
 import argparse, base64, json, os, re, subprocess, sys, tempfile, time
 
-TONES = [(24.7, 0.3), (49.4, 0.08), (187.4, 0.04), (311.3, 0.015)]
+TONES = [(24.7, 0.3), (49.4, 0.08), (187.4, 0.04), (317.6, 0.015)]
 CAMERA = ["--line-time-us", "40", "--exposure-us", "500"]
 
 
