@@ -50,21 +50,11 @@ pub fn zoned(report: &Report, limits: Option<&ZoneLimits>) -> String {
 }
 
 fn peak_line(peak: &Peak, um_per_px: Option<f32>) -> String {
-    let mut line = format!(
-        "{:>14.4} Hz ± {:<8} {:>9.5} px ± {:<8}",
-        peak.hz,
-        digits(peak.hz_sd.into(), 2),
-        peak.amplitude_px,
-        digits(peak.amplitude_px_sd.into(), 2),
+    let mut line = figures(
+        [peak.hz.into(), peak.hz_sd.into()],
+        [peak.amplitude_px.into(), peak.amplitude_px_sd.into()],
+        um_per_px.map(|scale| f64::from(peak.amplitude_px * scale)),
     );
-    if let Some(scale) = um_per_px {
-        let um = f64::from(peak.amplitude_px * scale);
-        let _ = write!(
-            line,
-            " {um:>9.3} µm {:>9.4} mm/s",
-            velocity_mm_s_rms(peak.hz.into(), um)
-        );
-    }
     let _ = write!(line, " {:>6.1} dB", peak.snr_db);
     if let Some(harmonic) = peak.harmonic {
         let _ = write!(line, "  {harmonic}x");
@@ -75,6 +65,22 @@ fn peak_line(peak: &Peak, um_per_px: Option<f32>) -> String {
     }
     if peak.ambiguous {
         line.push_str("  ambiguous: may be another frequency");
+    }
+    line
+}
+
+/// How every tone's line begins: frequency and amplitude with their standard deviations, Hz and px, and with a scale the
+/// amplitude in µm and the velocity.
+pub(crate) fn figures([hz, hz_sd]: [f64; 2], [px, px_sd]: [f64; 2], um: Option<f64>) -> String {
+    let mut line = format!(
+        "{hz:>14.4} Hz ± {:<8} {px:>9.5} px ± {:<8}",
+        digits(hz_sd, 2),
+        digits(px_sd, 2),
+    );
+    if let Some(um) = um {
+        let speed = velocity_mm_s_rms(hz, um);
+        // Writing to a string cannot fail.
+        let _ = write!(line, " {um:>9.3} µm {speed:>9.4} mm/s");
     }
     line
 }

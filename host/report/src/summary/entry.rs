@@ -39,7 +39,8 @@ impl Mean {
     }
 }
 
-fn finite(value: f64) -> f64 {
+/// The number, 0 where it is none.
+pub(super) fn finite(value: f64) -> f64 {
     if value.is_finite() { value } else { 0.0 }
 }
 

@@ -7,8 +7,8 @@ mod tests;
 
 use rowtone::report::{Report, Warnings};
 
-use entry::Entry;
 pub use entry::Persistent;
+use entry::{Entry, finite};
 
 /// Tones and figures of all windows of a recording, gathered report by report.
 ///
@@ -37,14 +37,17 @@ pub const MOST_TONES: usize = 256;
 impl Summary {
     /// Takes the report of the next window.
     pub fn take(&mut self, report: &Report) {
-        let (end_s, length_s) = (report.time_ms as f64 / 1000.0, sound(report.window_s));
+        let (end_s, length_s) = (
+            report.time_ms as f64 / 1000.0,
+            finite(report.window_s.into()),
+        );
         let begin_s = (end_s - length_s).max(0.0);
         let (from, to) = self.span_s.unwrap_or((begin_s, end_s));
         self.span_s = Some((from.min(begin_s), to.max(end_s)));
         self.windows += 1;
         self.total_s += length_s;
-        self.fps_s += sound(report.fps) * length_s;
-        self.noise_px2_s += sound(report.noise_px).powi(2) * length_s;
+        self.fps_s += finite(report.fps.into()) * length_s;
+        self.noise_px2_s += finite(report.noise_px.into()).powi(2) * length_s;
         self.um_per_px = report.um_per_px.or(self.um_per_px);
         if let Some(velocity) = super::band_velocity(report) {
             self.velocity2_s += velocity.powi(2) * length_s;
@@ -61,7 +64,7 @@ impl Summary {
     /// Gives each peak to the tone that it continues, the likeliest pairs first: those of one track, then the nearest
     /// within half a line of the window's resolution. A tone takes at most one peak of a window.
     fn peaks(&mut self, report: &Report, begin_s: f64, end_s: f64) {
-        let near_hz = 0.5 / sound(report.window_s).max(1e-3);
+        let near_hz = 0.5 / finite(report.window_s.into()).max(1e-3);
         let mut pairs = Vec::new();
         for (p, peak) in report.peaks.iter().enumerate() {
             for (e, entry) in self.entries.iter().enumerate() {
@@ -86,9 +89,4 @@ impl Summary {
         let new = new.map(|(peak, _)| Entry::new(peak, begin_s, end_s));
         self.entries.extend(new);
     }
-}
-
-/// The number, 0 where it is none.
-fn sound(value: f32) -> f64 {
-    if value.is_finite() { value.into() } else { 0.0 }
 }

@@ -5,7 +5,7 @@ use std::fmt::Write;
 use serde::Serialize;
 
 use super::{Persistent, Summary};
-use crate::text::digits;
+use crate::text::{digits, figures};
 use crate::zone::ZoneLimits;
 use crate::{sentence, velocity_mm_s_rms};
 
@@ -163,18 +163,12 @@ impl Summary {
     }
 
     fn line(&self, tone: &Persistent) -> String {
-        let mut line = format!(
-            "{:>14.4} Hz ± {:<8} {:>9.5} px ± {:<8}",
-            tone.hz,
-            digits(tone.hz_sd, 2),
-            tone.amplitude_px,
-            digits(tone.amplitude_px_sd, 2),
+        let um = self.um_per_px.map(|um| tone.amplitude_px * f64::from(um));
+        let mut line = figures(
+            [tone.hz, tone.hz_sd],
+            [tone.amplitude_px, tone.amplitude_px_sd],
+            um,
         );
-        if let Some(scale) = self.um_per_px {
-            let um = tone.amplitude_px * f64::from(scale);
-            let speed = velocity_mm_s_rms(tone.hz, um);
-            let _ = write!(line, " {um:>9.3} µm {speed:>9.4} mm/s");
-        }
         let _ = match (tone.windows, self.windows) {
             (_, 1) => write!(line, "  in the only window"),
             (n, all) if n == all => write!(line, "  in all {all} windows"),
