@@ -158,9 +158,26 @@ pub fn median(values: &[f64]) -> f64 {
     }
 }
 
+/// The value that half of the others are not above: of an even count the upper of the two in the middle; 0 for none.
+pub fn upper_median(values: &[f64]) -> f64 {
+    let mut values = values.to_vec();
+    let middle = values.len() / 2;
+    match values.is_empty() {
+        true => 0.0,
+        false => *values.select_nth_unstable_by(middle, f64::total_cmp).1,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn an_upper_median_is_one_of_the_values() {
+        assert_eq!(upper_median(&[]), 0.0);
+        assert_eq!(upper_median(&[3.0, 1.0, 2.0]), 2.0);
+        assert_eq!(upper_median(&[4.0, 1.0, 2.0, 3.0]), 3.0);
+    }
 
     #[test]
     fn solves_and_refuses() {

@@ -5,6 +5,7 @@ use rowtone::camera::Pixels;
 use super::error::{RecordingError, ShapesError};
 use super::readings::Readings;
 use rowtone_clip::{Feed, Frame, Rect};
+use rowtone_linear::upper_median;
 
 /// Of so many rows one is compared from frame to frame.
 const COMPARED: usize = 8;
@@ -68,7 +69,7 @@ impl Mean {
         }
         Ok(Self {
             pixels: picture.mean(),
-            variance: 0.5 * median(&differences),
+            variance: 0.5 * upper_median(&differences),
             used: used(&differences),
             span_ns,
         })
@@ -153,15 +154,9 @@ fn difference(a: &Frame, b: &Frame, whole: &Rect) -> f64 {
     sum / count.max(1) as f64
 }
 
-fn median(values: &[f64]) -> f64 {
-    let mut sorted = values.to_vec();
-    let middle = sorted.len() / 2;
-    *sorted.select_nth_unstable_by(middle, f64::total_cmp).1
-}
-
 /// Not a copy of the frame before, and not something else between two that are alike.
 fn used(differences: &[f64]) -> Vec<bool> {
-    let most = OUT_OF_PLACE * median(differences);
+    let most = OUT_OF_PLACE * upper_median(differences);
     let beyond = |k: usize| differences.get(k).is_none_or(|&d| d > most);
     (0..=differences.len())
         .map(|frame| {

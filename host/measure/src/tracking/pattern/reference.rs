@@ -3,6 +3,7 @@
 use rowtone::camera::Pixels;
 use rowtone::tracker::Tracker;
 use rowtone_clip::Rect;
+use rowtone_linear::upper_median;
 
 use super::line::Seen;
 use super::sums::Sums;
@@ -99,8 +100,8 @@ impl Reference {
             }
         }
         // Something passed before some of them, or they are of another place.
-        let learned = seen.iter().take(LEARNED);
-        let usual = median(learned.map(|(unlike, ..)| *unlike).collect());
+        let learned = seen.iter().take(LEARNED).map(|(unlike, ..)| *unlike);
+        let usual = upper_median(&learned.collect::<Vec<f64>>());
         seen.retain(|(unlike, ..)| *unlike < UNLIKE * usual);
         let (shifts, lines): (Vec<_>, Vec<_>) = seen
             .into_iter()
@@ -181,14 +182,5 @@ impl Reference {
             }
         }
         difference
-    }
-}
-
-/// The middle one of these; 0 of none.
-fn median(mut values: Vec<f64>) -> f64 {
-    let middle = values.len() / 2;
-    match values.is_empty() {
-        true => 0.0,
-        false => *values.select_nth_unstable_by(middle, f64::total_cmp).1,
     }
 }
