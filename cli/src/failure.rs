@@ -2,8 +2,10 @@
 
 use std::fmt;
 use std::io;
+use std::path::Path;
 
 use rowtone_clip::{ClipError, OptionError};
+use rowtone_files::WholeFile;
 #[cfg(feature = "lab")]
 use rowtone_lab::LabError;
 use rowtone_measure::MeasureError;
@@ -51,6 +53,14 @@ impl Failure {
         } else {
             Self::Input(format!("{place}: cannot be written: {error}"))
         }
+    }
+
+    /// Says before anything is measured that this file cannot be written.
+    ///
+    /// # Errors
+    /// [`Failure::Input`] where it cannot.
+    pub fn unless_writable(path: &Path) -> Result<(), Self> {
+        WholeFile::check(path).map_err(|e| Self::writing(&path.display().to_string(), &e))
     }
 
     /// What the process exits with.

@@ -17,7 +17,6 @@ use crate::output::page::StillPage;
 use crate::output::progress::Progress;
 use crate::output::spectrum_csv::SpectrumFile;
 use rowtone_clip::{Feed, Rect, Turn};
-use rowtone_files::WholeFile;
 use rowtone_measure::analysis::{Analysis, Event, Plan};
 use rowtone_measure::tracking::Shifts;
 use rowtone_plot::Picture;
@@ -83,7 +82,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     // What cannot be written is said before anything is measured.
     if let Some(path) = &args.plot {
         rowtone_plot::check_ending(path)?;
-        WholeFile::check(path).map_err(|e| Failure::writing(&path.display().to_string(), &e))?;
+        Failure::unless_writable(path)?;
     }
     args.report.as_deref().map_or(Ok(()), StillPage::check)?;
     args.spectrum

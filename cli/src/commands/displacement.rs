@@ -115,7 +115,7 @@ impl Args {
 pub fn run(args: &Args) -> Result<(), Failure> {
     let format = args.format()?;
     if let Some(path) = &args.output {
-        WholeFile::check(path).map_err(|e| Failure::writing(&path.display().to_string(), &e))?;
+        Failure::unless_writable(path)?;
     }
     if args.output.is_none() && format != Format::Csv && io::stdout().is_terminal() {
         return Err(Failure::usage(

@@ -100,7 +100,7 @@ impl Kind {
 pub fn run(args: &Args) -> Result<(), Failure> {
     let kind = args.output.as_deref().map(Kind::of).transpose()?;
     if let Some(path) = &args.output {
-        WholeFile::check(path).map_err(|e| Failure::writing(&path.display().to_string(), &e))?;
+        Failure::unless_writable(path)?;
     }
     if args.hz.len() > 8 {
         return Err(Failure::usage("--hz: at most 8 frequencies at a time"));

@@ -134,7 +134,7 @@ impl StillPage {
                 "--report {path}: give a name that ends with .html"
             )));
         }
-        WholeFile::check(path).map_err(|e| Failure::writing(&path.display().to_string(), &e))
+        Failure::unless_writable(path)
     }
 
     /// A page of what `feed` is about to deliver, with the settings it is measured with.

@@ -32,7 +32,7 @@ impl SpectrumFile {
                 "--spectrum {path}: give a name that ends with .csv"
             )));
         }
-        WholeFile::check(path).map_err(|e| Failure::writing(&path.display().to_string(), &e))
+        Failure::unless_writable(path)
     }
 
     /// The spectrum of what is measured after this plan, with this scale in µm a pixel.

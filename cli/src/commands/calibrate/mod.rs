@@ -16,7 +16,6 @@ use rowtone_calibrate::tone::motion::Watcher;
 use rowtone_calibrate::tone::{self, About};
 use rowtone_calibrate::{Calibration, Light, calibrate_with_stripes, plot};
 use rowtone_clip::{Rect, Turn};
-use rowtone_files::WholeFile;
 
 /// Standard deviation of the mains frequency, relative: ±0.03 Hz of 50, what large grids keep.
 const MAINS_RELATIVE_SD: f64 = 6e-4;
@@ -134,7 +133,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         ));
     }
     for path in [&args.output, &args.plot].into_iter().flatten() {
-        WholeFile::check(path).map_err(|e| Failure::writing(&path.display().to_string(), &e))?;
+        Failure::unless_writable(path)?;
     }
     let name = args.input.join(" ");
     let (recording, (calibration, stripes)) = if args.from_vibration {
