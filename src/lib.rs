@@ -23,6 +23,7 @@
 //! - [`spectrum`]: the tones in a window of samples, with their uncertainty, by joint least squares.
 //! - [`shape`]: beside the pipeline, what a known tone does in every tile of the picture.
 //! - [`report`]: what is said of a window, in which units.
+//! - [`alarm`]: beside the pipeline, from reports to warning and trip.
 //! - [`wire`]: a report as bytes and back.
 //! - [`link`]: a board's end of the serial line: settings, the outbox, the Modbus server.
 //!
@@ -78,6 +79,7 @@
 #![no_std]
 #![deny(unsafe_code)]
 
+pub mod alarm;
 pub mod camera;
 pub mod kernel;
 pub mod link;
