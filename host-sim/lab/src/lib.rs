@@ -6,9 +6,11 @@
 //! - [`spectrum_scenes`]: random displacement samples with known tones, for the spectrum's figures;
 //! - [`shape_scenes`]: parts that vibrate in known shapes, for the figures of `rowtone shapes`;
 //! - [`machine_scenes`]: machines that bend, turn and move in parts, and cameras with faults, to the report;
+//! - [`alarm_scenes`]: days of reports through the alarms, with steps;
 //! - [`calibrations`]: calibrations of simulated cameras, with the truth;
 //! - [`sound`]: speech and music, and how well a recovered sound agrees with them.
 
+pub mod alarm_scenes;
 pub mod calibrations;
 mod error;
 pub mod experiments;
