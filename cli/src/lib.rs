@@ -6,6 +6,7 @@
 //! - [`stop`]: what a signal does;
 //! - `terminal`: a screen of text for the live view.
 
+mod alarm_args;
 mod camera_args;
 pub mod commands;
 pub mod failure;

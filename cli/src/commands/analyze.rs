@@ -9,6 +9,7 @@ use rowtone::tracker::Axes;
 use rowtone::wire::{Message, text as wire_text};
 
 use super::window::WindowArgs;
+use crate::alarm_args::{self, AlarmArgs};
 use crate::camera_args::CameraArgs;
 use crate::failure::Failure;
 use crate::output::Out;
@@ -20,6 +21,7 @@ use rowtone_clip::{Feed, Rect, Turn};
 use rowtone_measure::analysis::{Analysis, Event, Plan};
 use rowtone_measure::tracking::Shifts;
 use rowtone_plot::Picture;
+use rowtone_report::alarms::Book;
 use rowtone_report::json::{self, Place};
 use rowtone_report::summary::Summary;
 use rowtone_report::text;
@@ -38,6 +40,8 @@ pub struct Args {
     camera: CameraArgs,
     #[command(flatten)]
     window: WindowArgs,
+    #[command(flatten)]
+    alarms: AlarmArgs,
     /// Where the zones B, C and D of ISO 20816 begin for this machine, mm/s RMS: adds its zone
     #[arg(long, value_name = "B,C,D", requires = "scale")]
     zone_limits: Option<ZoneLimits>,
@@ -79,6 +83,7 @@ enum Format {
 /// [`Failure`] as every command; reports of what was measured before come out all the same.
 pub fn run(args: &Args) -> Result<(), Failure> {
     args.window.check()?;
+    let alarms = args.alarms.book()?;
     // What cannot be written is said before anything is measured.
     if let Some(path) = &args.plot {
         rowtone_plot::check_ending(path)?;
@@ -137,6 +142,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         format: args.format,
         name: shifts.name.clone(),
         zone_limits: args.zone_limits.or(args.machine),
+        alarms,
         warnings: shifts.camera.warnings,
         progress: Progress::new(shifts.frames),
         out: Out::default(),
@@ -200,6 +206,7 @@ struct Outlets {
     /// What the recording is called in messages.
     name: String,
     zone_limits: Option<ZoneLimits>,
+    alarms: Option<Book>,
     /// What the recording itself warns of.
     warnings: Warnings,
     progress: Progress,
@@ -247,6 +254,7 @@ impl Outlets {
     /// Hands a report on, as soon as it is known.
     fn report(&mut self, report: &Report, shapes: &[PeakShape]) -> Result<(), Failure> {
         self.reports += 1;
+        let said = alarm_args::judge(&mut self.alarms, report);
         if let Some(summary) = &mut self.summary {
             summary.take(report);
         }
@@ -256,6 +264,7 @@ impl Outlets {
         if let Some(page) = &mut self.page {
             let limits = self.zone_limits.as_ref();
             let json = json::measured(report, shapes, self.place, limits);
+            let json = alarm_args::added(said.as_ref(), json);
             page.shown().report(report, json);
         }
         let sentence = if self.serial.is_some() || self.format == Format::Wire {
@@ -274,14 +283,17 @@ impl Outlets {
             brief.warnings = brief.warnings.without(self.warnings);
         }
         let out = &mut self.out;
+        let limits = self.zone_limits.as_ref();
         self.progress.aside(|| match self.format {
-            Format::Text => out.line(&text::zoned(&brief, self.zone_limits.as_ref())),
-            Format::Json => out.line(&json::measured(
-                report,
-                shapes,
-                self.place,
-                self.zone_limits.as_ref(),
-            )),
+            Format::Text => {
+                out.line(&text::zoned(&brief, limits))?;
+                let mut lines = said.iter().flat_map(|said| said.lines());
+                lines.try_for_each(|line| out.line(&format!("            {line}")))
+            }
+            Format::Json => {
+                let object = json::measured(report, shapes, self.place, limits);
+                out.line(&alarm_args::added(said.as_ref(), object))
+            }
             Format::Wire => sentence.map_or(Ok(()), |s| out.line(s.trim_end_matches('\n'))),
         })
     }

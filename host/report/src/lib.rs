@@ -1,6 +1,7 @@
 //! Reports as JSON Lines and as text, and what stands in neither and follows from both: velocities,
 //! zones, the names of warnings.
 
+pub mod alarms;
 mod broad;
 mod example;
 pub mod json;

@@ -6,6 +6,7 @@ use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use super::{Args, open};
+use crate::alarm_args::{added, judge};
 use crate::failure::Failure;
 use rowtone::link::settings::{Key, Limits, Settings};
 use rowtone::wire::text;
@@ -133,6 +134,7 @@ impl Control for Board {
 /// Follows the port until asked to end.
 pub(super) fn run(args: &Args, port: &PortName) -> Result<(), Failure> {
     let stop = crate::stop::on_signals();
+    let mut alarms = args.alarms.book()?;
     let live = Arc::new(Live::default());
     live.describe(About {
         name: port.path.clone(),
@@ -166,7 +168,9 @@ pub(super) fn run(args: &Args, port: &PortName) -> Result<(), Failure> {
             Event::End => live.set_phase(Phase::Ended, ""),
             Event::Bytes(bytes) => ear.hear(&bytes, |heard| match heard {
                 Heard::Report { report, .. } => {
-                    live.report(&report, json::zoned(&report, args.machine.as_ref()));
+                    let said = judge(&mut alarms, &report);
+                    let object = json::zoned(&report, args.machine.as_ref());
+                    live.report(&report, added(said.as_ref(), object));
                 }
                 Heard::Reply(reply) => board.heard(reply.ok, &reply.text),
                 Heard::Status(_) => {}

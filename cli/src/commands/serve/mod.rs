@@ -9,6 +9,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use super::window::WindowArgs;
+use crate::alarm_args::AlarmArgs;
 use crate::camera_args::CameraArgs;
 use crate::failure::Failure;
 use rowtone_page::control::{Access, Control, Keeper};
@@ -40,6 +41,8 @@ pub struct Args {
     /// Kind of machine whose zone after ISO 20816 is shown where there is a scale, as `iso20816-3:group2:flexible`
     #[arg(long, value_name = "NAME", value_parser = ZoneLimits::of_machine)]
     machine: Option<ZoneLimits>,
+    #[command(flatten)]
+    alarms: AlarmArgs,
     /// Address and port of the page; 0.0.0.0:7357 shows it to the whole network
     #[arg(long, value_name = "ADDR", default_value = "127.0.0.1:7357")]
     listen: SocketAddr,

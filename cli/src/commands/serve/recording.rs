@@ -4,6 +4,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use super::{ASKED_EVERY, Args, open};
+use crate::alarm_args::{added, judge};
 use crate::commands::analyze::axes_name;
 use crate::failure::Failure;
 use crate::output::page::{Shown, given_size};
@@ -15,6 +16,7 @@ use rowtone_measure::analysis::{Analysis, Event, Plan, Settings as Wanted};
 use rowtone_measure::tracking::Shifts;
 use rowtone_page::control::Control;
 use rowtone_page::live::{Live, Phase};
+use rowtone_report::alarms::Book;
 use rowtone_report::json::{self, Place};
 use rowtone_report::zone::ZoneLimits;
 
@@ -38,6 +40,8 @@ struct Desk {
     limits: Limits,
     /// Where the zones of the kind of machine that was named begin.
     zones: Option<ZoneLimits>,
+    /// Its alarms, before anything was seen.
+    alarms: Option<Book>,
     settings: Mutex<Settings>,
     /// Ends what is measured now.
     interrupt: Arc<AtomicBool>,
@@ -127,6 +131,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let mut feed = Some(Feed::open(&args.camera.options())?);
     let desk = Arc::new(desk(
         args,
+        args.alarms.book()?,
         feed.as_ref().map(|feed| &feed.camera),
         &interrupt,
     ));
@@ -156,7 +161,12 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     Ok(())
 }
 
-fn desk(args: &Args, camera: Option<&Camera>, interrupt: &Arc<AtomicBool>) -> Desk {
+fn desk(
+    args: &Args,
+    alarms: Option<Book>,
+    camera: Option<&Camera>,
+    interrupt: &Arc<AtomicBool>,
+) -> Desk {
     let (width, height) = camera.map_or((0, 0), given_size);
     let mut settings = args.window.as_a_board_says(args.camera.um_per_px());
     if let Roi::Part(Rect {
@@ -183,6 +193,7 @@ fn desk(args: &Args, camera: Option<&Camera>, interrupt: &Arc<AtomicBool>) -> De
             max_window_s: LONGEST_WINDOW_S,
         },
         zones: args.machine,
+        alarms,
         settings: Mutex::new(settings),
         interrupt: Arc::clone(interrupt),
         again: AtomicBool::new(false),
@@ -209,6 +220,7 @@ fn measure(desk: &Desk, live: &Arc<Live>, feed: Option<Feed>) -> Result<(), Fail
         roi: [given.x, given.y, given.width, given.height],
         axes: axes_name(shifts.axes),
     };
+    let mut alarms = desk.alarms.clone();
     let progress = Progress::new(shifts.frames);
     let mut memory = plan.memory();
     let mut analysis = Analysis::new(shifts, &plan, &mut memory)?;
@@ -219,10 +231,9 @@ fn measure(desk: &Desk, live: &Arc<Live>, feed: Option<Feed>) -> Result<(), Fail
             Event::Frame(_) => progress.step(),
             // What is interrupted by other settings is of no more use.
             Event::Report(report, shapes) if !desk.again.load(Ordering::Acquire) => {
-                shown.report(
-                    report,
-                    json::measured(report, shapes, place, desk.zones.as_ref()),
-                );
+                let object = json::measured(report, shapes, place, desk.zones.as_ref());
+                let said = judge(&mut alarms, report);
+                shown.report(report, added(said.as_ref(), object));
             }
             // The page shows which part was chosen, and warnings with each report.
             Event::Report(..) | Event::Sample(_) | Event::Note(_) => {}
