@@ -6,6 +6,7 @@
 //! `cargo test --release -p rowtone-cli --test gateway -- --ignored --nocapture`
 #![cfg(unix)]
 
+mod alarms;
 mod attacks;
 #[path = "../common/board.rs"]
 mod board;

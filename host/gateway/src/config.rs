@@ -9,6 +9,7 @@ use toml::Spanned;
 use super::error::GatewayError;
 use super::mqtt::packet::is_topic;
 use super::spool::record::MAX_NAME;
+use rowtone_report::alarms::Book;
 use rowtone_report::zone::ZoneLimits;
 use rowtone_serial::port::PortName;
 
@@ -94,6 +95,8 @@ pub struct Board {
     pub silent_s: u32,
     /// Where the zones of its machine begin: its reports then have one.
     pub zone_limits: Option<ZoneLimits>,
+    /// The alarms that its reports are judged by.
+    pub alarms: Option<Book>,
 }
 
 /// Longer than any usual hop.
@@ -116,6 +119,7 @@ struct BoardEntry {
     silent_s: Option<Spanned<u32>>,
     machine: Option<Spanned<String>>,
     zone_limits: Option<Spanned<String>>,
+    alarms: Option<Spanned<PathBuf>>,
 }
 
 impl BoardEntry {
@@ -231,6 +235,17 @@ impl Config {
                 Ok(limits) => limits,
                 Err((at, key, why)) => return wrong(at, key, &why),
             };
+            let alarms = match &entry.alarms {
+                Some(path) if matches!(file.payload.get_ref(), Payload::Sparkplug { .. }) => {
+                    let why = "alarms are told with format = \"json\" only";
+                    return wrong(path.span().start, "board.alarms", why);
+                }
+                Some(path) => match Book::read(path.get_ref()) {
+                    Ok(book) => Some(book),
+                    Err(e) => return wrong(path.span().start, "board.alarms", &e.to_string()),
+                },
+                None => None,
+            };
             if let Some(silent_s) = entry.silent_s.as_ref().filter(|s| *s.get_ref() == 0) {
                 let at = silent_s.span().start;
                 return wrong(at, "board.silent_s", "give at least 1");
@@ -268,6 +283,7 @@ impl Config {
                 port,
                 silent_s,
                 zone_limits,
+                alarms,
             });
         }
         let config = Self {
@@ -293,7 +309,7 @@ impl Config {
                 // A device has both names in its own, with up to eight letters for one.
                 let device = format!("rowtone-{}-{}", client_id.repeat(8), longest.repeat(8));
                 let prefix = discovery.as_deref().unwrap_or("x");
-                is_topic(&format!("{topic}/{longest}/report"))
+                is_topic(&format!("{topic}/{longest}/alarm/acknowledge"))
                     && is_topic(&format!("{prefix}/device/{device}/config"))
                     && is_topic(&format!("{topic}/gateway/{client_id}/state"))
             }
@@ -395,6 +411,11 @@ port = "/dev/ttyUSB1"
                 "name = \"press-4\"",
                 "name = \"press-4\"\nmachine = \"toaster\"",
                 "19: board.machine: want one of iso20816-3:group1:rigid",
+            ),
+            (
+                "name = \"press-4\"",
+                "name = \"press-4\"\nalarms = \"/nowhere/a.toml\"",
+                "19: board.alarms: /nowhere/a.toml: cannot be read: ",
             ),
             (
                 "name = \"press-4\"",

@@ -85,6 +85,20 @@ pub(super) fn device(prefix: &str, topics: Topics<'_>, board: &Board) -> (String
         )]);
     }
     let gateway = format!("{topic}/gateway/{client_id}/state");
+    if board.alarms.is_some() {
+        components.insert(
+            "alarm".to_owned(),
+            json!({
+                "platform": "sensor",
+                "unique_id": format!("{device}-alarm"),
+                "name": "Alarm",
+                "state_topic": format!("{topic}/{name}/alarm"),
+                "value_template": "{{ value_json.alarm_level }}",
+                "device_class": "enum",
+                "options": ["normal", "warning", "trip"],
+            }),
+        );
+    }
     components.insert(
         "state".to_owned(),
         json!({
@@ -126,6 +140,7 @@ mod tests {
             port: "/dev/ttyUSB0".parse().unwrap(),
             silent_s: 30,
             zone_limits: Some("1.4,2.8,4.5".parse().unwrap()),
+            alarms: None,
         };
         let topics = Topics {
             topic: "plant/vibration",

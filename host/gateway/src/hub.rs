@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender};
 use std::time::{Duration, Instant};
 
+use super::alarms::Alarms;
 use super::broker::{Address, Retry};
 use super::config::{Config, Payload};
 use super::delivery::{Delivery, Suspect, Verdict};
@@ -59,6 +60,7 @@ pub(super) struct Hub<'a> {
     /// Boards whose line has gone, and of which the broker has not been told.
     gone: BTreeSet<String>,
     watch: Watch,
+    alarms: Alarms,
     births: Births,
     counters: Vec<Counters>,
 }
@@ -92,6 +94,7 @@ impl<'a> Hub<'a> {
             passed_over_at: None,
             gone: BTreeSet::new(),
             watch: Watch::new(&config.boards, now),
+            alarms: Alarms::new(config),
             births: Births::read(&config.spool.dir),
             counters: vec![Counters::default(); config.boards.len()],
         }
@@ -143,6 +146,7 @@ impl<'a> Hub<'a> {
         match input {
             Input::Report(entry) => {
                 self.spool.push(&entry);
+                self.alarms.window(&entry);
                 let board = &entry.board;
                 if self.watch.heard(board, Instant::now(), unix_ms()) {
                     self.gone.remove(board);
@@ -199,7 +203,10 @@ impl<'a> Hub<'a> {
                 self.say_hello(now);
             }
             Note::Acknowledged(number) => self.delivery.acknowledged(number, now),
-            Note::Message(message) => self.rebirth |= sparkplug::asks_rebirth(&message),
+            Note::Message(message) => {
+                self.rebirth |= sparkplug::asks_rebirth(&message.payload);
+                self.alarms.hear(&message, unix_ms());
+            }
             Note::PassedOver(bytes) => {
                 let recent = |at| now.duration_since(at) < REPEAT;
                 if !self.passed_over_at.is_some_and(recent) {
@@ -274,7 +281,8 @@ impl<'a> Hub<'a> {
     fn say_hello(&mut self, now: Instant) {
         self.rebirth = false;
         self.rebirth_at = now + REBIRTH;
-        if let Some(filter) = self.speech.subscription()
+        let filter = self.speech.subscription().or(self.alarms.subscription());
+        if let Some(filter) = filter
             && let (Some(client), Ok(packet)) = (&self.client, packet::subscribe(1, &filter))
         {
             client.send(packet);
@@ -293,6 +301,7 @@ impl<'a> Hub<'a> {
         for standing in standings {
             self.publish(&standing, None, now);
         }
+        self.alarms.say_again();
     }
 
     /// Tells of a board that has changed its state.
@@ -340,6 +349,10 @@ impl<'a> Hub<'a> {
             self.say_hello(now);
         }
         while self.connected && now >= self.send_at && self.delivery.has_room() {
+            if let Some(alarm) = self.alarms.next() {
+                self.publish(&alarm, None, now);
+                continue;
+            }
             let Some((mark, record)) = self.spool.next_record(now) else {
                 // All is said that boards without a line had to say.
                 for board in std::mem::take(&mut self.gone) {

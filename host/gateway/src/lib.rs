@@ -8,6 +8,7 @@
 //! which boards speak.
 //! `docs/gateway.md` is for whoever sets it up.
 
+mod alarms;
 mod broker;
 mod config;
 mod delivery;

@@ -145,6 +145,7 @@ mod tests {
             port: "/dev/ttyUSB0".parse().unwrap(),
             silent_s,
             zone_limits: None,
+            alarms: None,
         };
         let mut watch = Watch::new(&[board("a", 10), board("b", 60)], start);
         assert_eq!(watch.known().count(), 0);

@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 use rustls::pki_types::ServerName;
 use rustls::{ClientConfig, ClientConnection, StreamOwned};
 
-use super::packet::{self, Decoder, PING, Packet};
+use super::packet::{self, Decoder, Message, PING, Packet};
 
 /// The broker has to answer at its start, to a ping, and take what is written, within this.
 const PATIENCE: Duration = Duration::from_secs(10);
@@ -31,7 +31,7 @@ pub(crate) enum Note {
     /// The broker has taken responsibility for the message of this number.
     Acknowledged(u16),
     /// A message came.
-    Message(Vec<u8>),
+    Message(Message),
     /// One came that is too long to be read: so many bytes. It is passed over.
     PassedOver(usize),
     /// It is lost.
@@ -153,9 +153,9 @@ fn serve(
                 Packet::Refused(code) => return Err(refused(code)),
                 _ if !accepted => return Err(not_mqtt()),
                 Packet::Acknowledged(number) => Note::Acknowledged(number),
-                Packet::Message(payload, number) => {
+                Packet::Message(message, number) => {
                     acknowledge(stream, number)?;
-                    Note::Message(payload)
+                    Note::Message(message)
                 }
                 Packet::Oversized(length, number) => {
                     acknowledge(stream, number)?;

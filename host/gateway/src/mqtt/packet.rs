@@ -63,7 +63,7 @@ pub enum Packet {
     /// It has taken responsibility for the message of this number.
     Acknowledged(u16),
     /// A message, its number where it wants an answer.
-    Message(Vec<u8>, Option<u16>),
+    Message(Message, Option<u16>),
     /// A message longer than [`MAX_MESSAGE`], its length and its number.
     Oversized(usize, Option<u16>),
     /// The answer to a ping.
@@ -249,7 +249,13 @@ fn parse(first: u8, body: &[u8]) -> Result<Packet, NoMqtt> {
         (4, [upper, lower]) => Packet::Acknowledged(u16::from_be_bytes([*upper, *lower])),
         (3, body) => {
             let (number, start) = message(first, body).ok_or(NoMqtt)?;
-            Packet::Message(body[start..].to_vec(), number)
+            let topic_end = start - if number.is_some() { 2 } else { 0 };
+            let message = Message {
+                topic: String::from_utf8_lossy(&body[2..topic_end]).into_owned(),
+                payload: body[start..].to_vec(),
+                retain: first & 0x01 != 0,
+            };
+            Packet::Message(message, number)
         }
         (13, []) => Packet::Pong,
         // SUBACK, and what belongs to QoS 2, which nobody asked for.
@@ -339,7 +345,7 @@ mod tests {
             Packet::Oversized(MAX_MESSAGE + 12, Some(9)),
             Packet::Acknowledged(258),
             Packet::Pong,
-            Packet::Message(vec![7; 3], Some(10)),
+            Packet::Message(message(3), Some(10)),
         ];
         for step in [1, 3, 1000, 65_536, bytes.len()] {
             assert_eq!(decoded(&bytes, step), expected, "{step} at once");
