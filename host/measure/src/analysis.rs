@@ -12,6 +12,7 @@ use rowtone::tracker::Axes;
 
 use crate::MeasureError;
 use crate::keyed::Held;
+use crate::since_frame::Later;
 use crate::tracking::{FrameShifts, Shifts};
 use crate::wander::Wander;
 use rowtone_clip::{Camera, Rect};
@@ -216,11 +217,18 @@ impl<'a> Analysis<'a> {
         }
         if let Some(held) = self.held.take() {
             let keys = self.shifts.key_samples();
-            for (report, shapes) in held.judged(keys, self.group, self.band_hz) {
+            let later = self.later();
+            for (mut report, mut shapes) in held.judged(keys, self.group, self.band_hz) {
+                later.turn_all(&mut report, &mut shapes);
                 on(Event::Report(&report, &shapes))?;
             }
         }
         outcome
+    }
+
+    /// How much later than the picture the part begins.
+    fn later(&self) -> Later {
+        Later::of_row(self.shifts.part.y, self.group.timing())
     }
 
     /// What to say when no row of the recording could be measured.
@@ -303,7 +311,10 @@ impl<'a> Analysis<'a> {
                 held.push(report, shapes);
                 Ok(())
             }
-            None => on(Event::Report(&report, &shapes)),
+            None => {
+                self.later().turn_all(&mut report, &mut shapes);
+                on(Event::Report(&report, &shapes))
+            }
         }
     }
 }

@@ -12,6 +12,7 @@ mod keyed;
 pub mod periodogram;
 pub mod restore;
 pub mod shapes;
+mod since_frame;
 pub mod tracking;
 mod wander;
 
