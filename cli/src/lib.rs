@@ -13,5 +13,6 @@ pub mod failure;
 mod known_length;
 pub mod output;
 mod quantity;
+mod reference;
 pub mod stop;
 mod terminal;

@@ -17,6 +17,7 @@ use crate::output::first_frame::FirstFrame;
 use crate::output::page::StillPage;
 use crate::output::progress::Progress;
 use crate::output::spectrum_csv::SpectrumFile;
+use crate::reference::{Against, Reference};
 use rowtone_clip::{Feed, Rect, Turn};
 use rowtone_measure::analysis::{Analysis, Event, Plan};
 use rowtone_measure::tracking::Shifts;
@@ -49,6 +50,9 @@ pub struct Args {
     #[arg(long, value_name = "NAME", requires = "scale", conflicts_with = "zone_limits",
           value_parser = ZoneLimits::of_machine)]
     machine: Option<ZoneLimits>,
+    /// Another part of the picture: adds each tone's phase and amplitude against it. The recording is read twice
+    #[arg(long, value_name = "X,Y,W,H")]
+    reference: Option<Rect>,
     /// Format of the reports on standard output
     #[arg(long, value_enum, default_value = "text")]
     format: Format,
@@ -100,6 +104,12 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     }
     let options = args.camera.options();
     let session = session();
+    let scale = args.camera.um_per_px();
+    let reference = args.reference.map(|part| {
+        let settings = args.window.settings(scale);
+        Reference::measure(&options, part, &settings)
+    });
+    let reference = reference.transpose()?;
     let serial = args.serial.as_ref().map(|port| {
         // What comes through a pipe may be live, and does not wait.
         let may_wait = !options.is_pipe();
@@ -128,7 +138,6 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             one_a_frame: args.camera.global_shutter,
         })
     });
-    let scale = args.camera.um_per_px();
     let spectrum = args.spectrum.clone();
     let spectrum = spectrum.map(|path| SpectrumFile::new(path, &plan, shifts.axes, scale));
     let part = shifts.part;
@@ -143,6 +152,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         name: shifts.name.clone(),
         zone_limits: args.zone_limits.or(args.machine),
         alarms,
+        reference,
         warnings: shifts.camera.warnings,
         progress: Progress::new(shifts.frames),
         out: Out::default(),
@@ -207,6 +217,7 @@ struct Outlets {
     name: String,
     zone_limits: Option<ZoneLimits>,
     alarms: Option<Book>,
+    reference: Option<Reference>,
     /// What the recording itself warns of.
     warnings: Warnings,
     progress: Progress,
@@ -255,6 +266,7 @@ impl Outlets {
     fn report(&mut self, report: &Report, shapes: &[PeakShape]) -> Result<(), Failure> {
         self.reports += 1;
         let said = alarm_args::judge(&mut self.alarms, report);
+        let against = self.reference.as_ref().map(|r| r.against(report));
         if let Some(summary) = &mut self.summary {
             summary.take(report);
         }
@@ -287,11 +299,15 @@ impl Outlets {
         self.progress.aside(|| match self.format {
             Format::Text => {
                 out.line(&text::zoned(&brief, limits))?;
-                let mut lines = said.iter().flat_map(|said| said.lines());
+                let phases = against.iter().flat_map(Against::lines);
+                let mut lines = phases.chain(said.iter().flat_map(|said| said.lines()));
                 lines.try_for_each(|line| out.line(&format!("            {line}")))
             }
             Format::Json => {
-                let object = json::measured(report, shapes, self.place, limits);
+                let mut object = json::measured(report, shapes, self.place, limits);
+                if let Some(against) = &against {
+                    object = json::extended(object, against);
+                }
                 out.line(&alarm_args::added(said.as_ref(), object))
             }
             Format::Wire => sentence.map_or(Ok(()), |s| out.line(s.trim_end_matches('\n'))),

@@ -179,6 +179,24 @@ pub fn report(report: &Report) -> String {
     zoned(report, None)
 }
 
+/// A JSON object with the keys of another at its end.
+///
+/// ```
+/// let more = std::collections::BTreeMap::from([("b", 2)]);
+/// assert_eq!(rowtone_report::json::extended(r#"{"a":1}"#.to_owned(), &more), r#"{"a":1,"b":2}"#);
+/// ```
+pub fn extended(mut object: String, more: &impl Serialize) -> String {
+    // Numbers, strings and lists of them always serialise.
+    let more = serde_json::to_string(more).unwrap_or_default();
+    if let Some(more) = more.strip_prefix('{')
+        && object.pop() == Some('}')
+    {
+        object.push(',');
+        object.push_str(more);
+    }
+    object
+}
+
 /// The same, with the machine's zone where the limits are given and there is a scale.
 pub fn zoned(report: &Report, limits: Option<&ZoneLimits>) -> String {
     to_string(report, &[], limits, None)

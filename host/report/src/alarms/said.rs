@@ -3,6 +3,7 @@
 use rowtone::alarm::{Alarms, Event, Happening, Level, Rule, Status};
 use serde::Serialize;
 
+use crate::json;
 use crate::text::digits;
 
 /// How all rules stand after a window, and what has changed by it.
@@ -152,13 +153,8 @@ impl Said {
     /// # Ok::<(), rowtone_report::alarms::FileError>(())
     /// ```
     #[must_use]
-    pub fn added_to(&self, mut object: String) -> String {
-        if object.pop() == Some('}') {
-            let own = self.json();
-            object.push(',');
-            object.push_str(own.strip_prefix('{').unwrap_or_default());
-        }
-        object
+    pub fn added_to(&self, object: String) -> String {
+        json::extended(object, self)
     }
 
     /// What has changed, a line each: `alarm fan: warning (4.90 mm/s, limit 4.50 mm/s)`.
