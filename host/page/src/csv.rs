@@ -10,7 +10,8 @@ use crate::reports::Entry;
 
 /// The heading.
 const HEADING: &str = "unix_s,seq,t_s,window_s,fps,rows,lost_frames,noise_px,velocity_mm_s_rms,warnings,track,hz,hz_sd,\
-amplitude_px,amplitude_px_sd,amplitude_um,peak_velocity_mm_s_rms,snr_db,x_px,x_px_sd,y_px,y_px_sd,harmonic,ambiguous\n";
+amplitude_px,amplitude_px_sd,amplitude_um,peak_velocity_mm_s_rms,snr_db,x_px,x_px_sd,y_px,y_px_sd,harmonic,ambiguous,\
+phase_rad,y_phase_rad,hz_per_s\n";
 
 /// Seconds since 1970.
 pub(crate) fn unix_s(time: SystemTime) -> f64 {
@@ -42,7 +43,7 @@ pub fn text(entries: &[Arc<Entry>]) -> String {
             warnings.join(" ")
         );
         if report.peaks.is_empty() {
-            let _ = writeln!(text, "{head},,,,,,,,,,,,,,");
+            let _ = writeln!(text, "{head},,,,,,,,,,,,,,,,,");
         }
         for peak in &report.peaks {
             let um = report.um_per_px.map(|scale| scale * peak.amplitude_px);
@@ -50,7 +51,7 @@ pub fn text(entries: &[Arc<Entry>]) -> String {
             let motion = peak.motion.as_ref();
             let _ = writeln!(
                 text,
-                "{head},{},{},{},{},{},{},{},{},{},{},{},{},{},{}",
+                "{head},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}",
                 peak.track,
                 peak.hz,
                 peak.hz_sd,
@@ -64,7 +65,10 @@ pub fn text(entries: &[Arc<Entry>]) -> String {
                 maybe(motion.and_then(|m| m.y_px)),
                 maybe(motion.and_then(|m| m.y_px_sd)),
                 peak.harmonic.map_or(String::new(), |n| n.to_string()),
-                u8::from(peak.ambiguous)
+                u8::from(peak.ambiguous),
+                maybe(motion.map(|m| m.phase_rad)),
+                maybe(motion.and_then(|m| m.y_phase_rad)),
+                maybe(motion.and_then(|m| m.hz_per_s)),
             );
         }
     }

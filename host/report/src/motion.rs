@@ -47,6 +47,14 @@ pub(crate) fn words(peak: &Peak) -> String {
     words.join(", ")
 }
 
+/// The phase of the larger axis to a tenth of a degree, never -0.
+pub(crate) fn phase_degrees(motion: &Motion) -> f64 {
+    let of_y = motion.y_px > motion.x_px;
+    let phase = motion.y_phase_rad.filter(|_| of_y);
+    let phase = f64::from(phase.unwrap_or(motion.phase_rad)).to_degrees();
+    (phase * 10.0).round() / 10.0 + 0.0
+}
+
 /// The direction or the orbit; `None` where one axis alone is measured.
 fn direction(motion: &Motion) -> Option<String> {
     if let Some(across) = motion.across_rad {
@@ -145,6 +153,17 @@ mod tests {
             ..moving(0.2, 0.0, 0.0)
         };
         assert_eq!(said(alone), "");
+    }
+
+    #[test]
+    fn a_phase_is_that_of_the_larger_axis() {
+        let told = |x, y| phase_degrees(&moving(x, y, 0.2));
+        assert_eq!([told(0.3, 0.1), told(0.1, 0.3)], [17.2, 28.6]);
+        let nothing = Motion {
+            phase_rad: -1e-4,
+            ..moving(0.3, 0.1, 0.2)
+        };
+        assert!(phase_degrees(&nothing).is_sign_positive());
     }
 
     #[test]

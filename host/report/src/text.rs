@@ -63,6 +63,9 @@ fn peak_line(peak: &Peak, um_per_px: Option<f32>) -> String {
     if !motion.is_empty() {
         let _ = write!(line, "  {motion}");
     }
+    if let Some(motion) = &peak.motion {
+        let _ = write!(line, "  phase {:.1}°", motion::phase_degrees(motion));
+    }
     if peak.ambiguous {
         line.push_str("  ambiguous: may be another frequency");
     }
