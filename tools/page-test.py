@@ -147,7 +147,10 @@ def main():
         clip = f"{folder}/press.y4m"
         tone_args = [word for hz, px in TONES for word in ("--tone", f"{hz}:{px}")]
         subprocess.run([args.rowtone, "simulate", "--seconds", "8", *tone_args, "-o", clip], check=True, stderr=subprocess.DEVNULL)
-        page, url = serve(args.rowtone, clip, *CAMERA, "--um-per-px", "120", "--hop", "0.25")
+        rules = f"{folder}/rules.toml"
+        with open(rules, "w") as file:  # 0.3 px are 36 um
+            file.write('[[alarm]]\nname = "press"\nquantity = "tone"\nhz = 24.7\nunit = "um"\nwarning = 30\ntrip = 50\n')
+        page, url = serve(args.rowtone, clip, *CAMERA, "--um-per-px", "120", "--hop", "0.25", "--alarms", rules)
         browser = Browser(f"{folder}/profile")
         scheme = {"name": "prefers-color-scheme", "value": "dark" if args.dark else "light"}
         browser.call("Emulation.setEmulatedMedia", features=[scheme])
@@ -159,9 +162,13 @@ def main():
             rows = browser.value("document.querySelectorAll('#peaks tr').length")
             check("the table has a row a tone", rows == len(TONES), rows)
             drawn = "(id) => { const c = document.getElementById(id); return new Set(new Uint32Array(c.getContext('2d').getImageData(0, 0, c.width, c.height).data.buffer)).size; }"
-            for chart in ("picture", "spectrum", "motion", "orbit", "waterfall"):
+            for chart in ("picture", "spectrum", "motion", "orbit", "waterfall", "trend"):
                 colours = browser.value(f"({drawn})('{chart}')")
                 check(f"{chart} is drawn", colours > 3, colours)
+            row = browser.value("[...document.querySelectorAll('#alarms td')].map((cell) => cell.textContent)")
+            check("the alarm is shown", row[:2] == ["press", "warning"] and row[3:] == ["30.0", "50.0", "µm"], row)
+            phases = browser.value("[...document.querySelectorAll('#peaks tr')].map((row) => row.querySelectorAll('td.wide').length && row.querySelectorAll('td.wide')[3].textContent)")
+            check("each tone has its phase", len(phases) == len(TONES) and abs(float(phases[0])) < 5, phases)
             if args.shots:
                 browser.shot(f"{args.shots}/page-1280x800.png")
             if args.whole:

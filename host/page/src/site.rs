@@ -23,6 +23,7 @@ pub const PAGE: &str = concat!(
     include_str!("../web/body.html"),
     include_str!("../web/numbers.js"),
     include_str!("../web/charts.js"),
+    include_str!("../web/trend.js"),
     include_str!("../web/picture.js"),
     include_str!("../web/shapes.js"),
     include_str!("../web/settings.js"),

@@ -1,6 +1,6 @@
 // ---- What comes in, and all of it drawn ----
 
-const DATA = { reports: [], epoch: null, id: 0, curve: null, state: null, chosenTrack: null, heard: 0, pictures: -1 };
+const DATA = { reports: [], epoch: null, id: 0, curve: null, state: null, chosenTrack: null, chosenAlarm: null, heard: 0, pictures: -1 };
 const MOST_REPORTS = 600;
 
 const newest = () => DATA.reports[DATA.reports.length - 1];
@@ -33,11 +33,18 @@ function flags(peak) {
   return list;
 }
 
+/** The phase of the larger axis at the first frame's start, degrees. */
+function phaseOf(peak) {
+  const phase = peak.y_px > peak.x_px ? peak.y_phase_rad : peak.phase_rad;
+  return Number.isFinite(phase) ? (Math.round((phase * 1800) / Math.PI) / 10).toFixed(1) : "–";
+}
+
 function drawPeaks(report) {
   const [scale, unit] = unitOf(report);
   const scaled = unit === "µm";
   const both = report.peaks.some((peak) => Number.isFinite(peak.y_px));
-  const columns = [["Hz"], ["amplitude", unit], ...(both ? [["x", unit, "wide"], ["y", unit, "wide"]] : []), ...(scaled ? [["velocity", "mm/s"]] : []), ["SNR", "dB", "wide"], [""]];
+  const phased = report.peaks.some((peak) => Number.isFinite(peak.phase_rad));
+  const columns = [["Hz"], ["amplitude", unit], ...(both ? [["x", unit, "wide"], ["y", unit, "wide"]] : []), ...(scaled ? [["velocity", "mm/s"]] : []), ["SNR", "dB", "wide"], ...(phased ? [["phase", "°", "wide"]] : []), [""]];
   $("peaks-head").replaceChildren(...columns.map(([name, of, wide]) => {
     const head = element("th", name, wide);
     head.scope = "col";
@@ -70,7 +77,9 @@ function drawPeaks(report) {
     row.append(hz, cell(peak.amplitude_px, peak.amplitude_px_sd));
     if (both) row.append(cell(peak.x_px, peak.x_px_sd, "wide"), cell(peak.y_px, peak.y_px_sd, "wide"));
     if (scaled) row.append(element("td", digits(peak.velocity_mm_s_rms, 3)));
-    row.append(element("td", peak.snr_db.toFixed(1), "wide"), notes);
+    row.append(element("td", peak.snr_db.toFixed(1), "wide"));
+    if (phased) row.append(element("td", phaseOf(peak), "wide"));
+    row.append(notes);
     return row;
   }));
   $("no-peaks").hidden = report.peaks.length > 0;
@@ -145,6 +154,8 @@ function draw() {
   drawPeaks(report);
   drawSpectrum(report, DATA.reports, chosen);
   drawWaterfall(DATA.reports);
+  drawAlarms(report);
+  drawTrend(DATA.reports);
   if (DATA.curve?.t_ms.length) drawMotion(DATA.curve, report);
   const peak = report.peaks[chosen];
   $("orbit-note").textContent = peak ? `${digits(peak.hz, 4)} Hz` : "";
