@@ -18,12 +18,14 @@
 //!
 //! Everything but [`capture`]'s libcamera part (feature `libcamera`) builds and is tested anywhere.
 
+pub mod alarms;
 pub mod alive;
 pub mod backoff;
 pub mod capture;
 pub mod clock;
 pub mod config;
 pub mod doctor;
+pub mod gpio;
 pub mod journal;
 pub mod lines;
 pub mod memory;

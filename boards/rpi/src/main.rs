@@ -10,6 +10,7 @@ use std::time::{Duration, Instant};
 use clap::{Parser, Subcommand};
 use rowtone_page::live::Live;
 use rowtone_page::password::Hash;
+use rowtone_rpi::alarms::Desk;
 use rowtone_rpi::capture::simulated::{Scene, Simulated};
 use rowtone_rpi::capture::{CameraError, Source};
 use rowtone_rpi::config::Wish;
@@ -159,7 +160,14 @@ fn measure(cli: &Cli, config: &Config) -> ExitCode {
         .page
         .listen
         .map(|_| Arc::new(Live::new(config.page.clip_bytes)));
-    let shared = Shared::new(config.settings);
+    let alarms = match Desk::open(&config.alarms) {
+        Ok(alarms) => alarms,
+        Err(e) => {
+            log(&format!("alarms.rules: {e}"));
+            return ExitCode::from(2);
+        }
+    };
+    let shared = Shared::new(config.settings).with_alarms(alarms);
     let shared = Arc::new(match &live {
         Some(live) => shared.with_page(Arc::clone(live)),
         None => shared,
@@ -189,6 +197,10 @@ fn measure(cli: &Cli, config: &Config) -> ExitCode {
             log(&format!("signal {signal} cannot be caught: {e}"));
         }
     }
+    let seen = Arc::new(AtomicBool::new(false));
+    if let Err(e) = signal_hook::flag::register(signal_hook::consts::SIGUSR1, Arc::clone(&seen)) {
+        log(&format!("signal USR1 cannot be caught: {e}"));
+    }
     // Starting libcamera takes a moment in which a signal may come.
     let mut open = match opener(cli.simulate) {
         Ok(open) => open,
@@ -199,8 +211,8 @@ fn measure(cli: &Cli, config: &Config) -> ExitCode {
     };
     let done = AtomicBool::new(false);
     let outcome = std::thread::scope(|scope| {
-        let (shared, asked, done) = (&*shared, &asked, &done);
-        scope.spawn(move || watch(shared, asked, done));
+        let (shared, asked, seen, done) = (&*shared, &asked, &seen, &done);
+        scope.spawn(move || watch(shared, [asked, seen], done));
         // Also where it panics: the scope would wait for ever.
         let _done = Done(done);
         run::run(config, shared, &mut open)
@@ -252,11 +264,15 @@ impl Drop for Done<'_> {
 /// How long an end in order may take: less than systemd waits (`TimeoutStopSec`).
 const LAST_WORDS: Duration = Duration::from_secs(8);
 
-/// The thread that waits for signals, until `done`.
-fn watch(shared: &Shared, asked: &AtomicBool, done: &AtomicBool) {
+/// The thread that waits for signals, to end and to acknowledge alarms, until `done`.
+fn watch(shared: &Shared, [asked, seen]: [&AtomicBool; 2], done: &AtomicBool) {
     let mut stopping: Option<Instant> = None;
     while !done.load(Ordering::Relaxed) {
         shared.pulses.signals.beat(shared.started);
+        if seen.swap(false, Ordering::Relaxed) {
+            shared.acknowledge();
+        }
+        shared.hear_silence();
         if asked.load(Ordering::Relaxed) {
             shared.stop.store(true, Ordering::Relaxed);
         }

@@ -15,6 +15,7 @@ use rowtone_page::guard::Names;
 use rowtone_page::live::{About, Live, Phase};
 use rowtone_page::server::Server;
 use rowtone_page::site::Site;
+use rowtone_report::alarms::Said;
 use rowtone_report::json::{self, Place};
 
 use crate::capture::Facts;
@@ -50,8 +51,8 @@ pub(crate) fn report(
     live: &Live,
     mut report: Report,
     shapes: &[PeakShape],
-    setup: &Setup,
-    shared: &Shared,
+    said: Option<&Said>,
+    (setup, shared): (&Setup, &Shared),
 ) {
     // On the line the outbox numbers reports, also over the sessions of one start.
     report.seq = live.reports.position().1 as u32;
@@ -64,7 +65,12 @@ pub(crate) fn report(
             Axes::Xy => "xy",
         },
     };
-    live.report(&report, json::measured(&report, shapes, place, None));
+    let object = json::measured(&report, shapes, place, None);
+    let object = match said {
+        Some(said) => said.added_to(object),
+        None => object,
+    };
+    live.report(&report, object);
 }
 
 /// The device as the page sees it.

@@ -254,8 +254,15 @@ fn compute(
         // The core counts from the session's first frame, a board from its own start.
         let first = *first_ms.get_or_insert(report.time_ms);
         report.time_ms = ready.offset_ms + report.time_ms.saturating_sub(first);
+        let said = shared.on_alarms(|desk| desk.window(&report));
         if let (Some(live), Some(shapes)) = (&shared.live, shapes) {
-            page::report(live, report.clone(), &shapes, setup, shared);
+            page::report(
+                live,
+                report.clone(),
+                &shapes,
+                said.as_ref(),
+                (setup, shared),
+            );
         }
         if reports.try_send(report).is_err() {
             shared.dropped.fetch_add(1, Ordering::Relaxed);

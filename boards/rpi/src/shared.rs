@@ -8,6 +8,7 @@ use std::time::Instant;
 use rowtone::link::settings::Settings;
 use rowtone_page::live::Live;
 
+use crate::alarms::Desk;
 use crate::alive::Pulses;
 
 /// What all threads share.
@@ -29,6 +30,8 @@ pub struct Shared {
     pub live: Option<Arc<Live>>,
     /// Settings that the page asks for, until the output thread takes them.
     pub wish: Mutex<Option<PageWish>>,
+    /// The machine's alarms; none where the configuration has no rules.
+    pub alarms: Mutex<Option<Desk>>,
     /// When the program began.
     pub started: Instant,
 }
@@ -54,6 +57,7 @@ impl Shared {
             dropped: AtomicU64::new(0),
             live: None,
             wish: Mutex::new(None),
+            alarms: Mutex::new(None),
             started: Instant::now(),
         }
     }
@@ -65,6 +69,31 @@ impl Shared {
             live: Some(live),
             ..self
         }
+    }
+
+    /// The same with alarms.
+    #[must_use]
+    pub fn with_alarms(self, alarms: Option<Desk>) -> Self {
+        Self {
+            alarms: Mutex::new(alarms),
+            ..self
+        }
+    }
+
+    /// Does something with the alarms, where there are some.
+    pub(crate) fn on_alarms<T>(&self, with: impl FnOnce(&mut Desk) -> T) -> Option<T> {
+        let mut alarms = self.alarms.lock().unwrap_or_else(PoisonError::into_inner);
+        alarms.as_mut().map(with)
+    }
+
+    /// Acknowledges all alarms.
+    pub fn acknowledge(&self) {
+        self.on_alarms(Desk::acknowledge);
+    }
+
+    /// Tells the alarms how late it is: where no report comes, a contact that fails safe opens.
+    pub fn hear_silence(&self) {
+        self.on_alarms(|desk| desk.hear_silence(Instant::now()));
     }
 
     /// The settings in use.

@@ -4,13 +4,14 @@ use std::fmt::Display;
 use std::ops::RangeInclusive;
 use std::path::PathBuf;
 
+use rowtone::alarm::Level;
 use rowtone::link::settings::{Key, Region};
 use rowtone::report::MAX_PEAKS;
 use rowtone::wire::Format;
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::{Config, ConfigError, Replay, StreamWish};
+use super::{Config, ConfigError, ContactConfig, Replay, StreamWish};
 
 type Maybe<T> = Option<Spanned<T>>;
 
@@ -22,6 +23,7 @@ struct File {
     output: Output,
     service: Service,
     page: Page,
+    alarms: Alarms,
 }
 
 #[derive(Deserialize, Default)]
@@ -80,6 +82,16 @@ struct Page {
     password: Maybe<String>,
     names: Vec<String>,
     clip_mib: Maybe<u32>,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(deny_unknown_fields, default)]
+struct Alarms {
+    rules: Option<PathBuf>,
+    gpio_chip: Option<PathBuf>,
+    gpio_line: Maybe<u32>,
+    gpio_at: Maybe<String>,
+    gpio_fail_safe: Maybe<bool>,
 }
 
 /// Turns places in the text into errors.
@@ -160,6 +172,7 @@ pub(super) fn read(text: &str, name: &str) -> Result<Config, ConfigError> {
         config.service.state.clone_from(state);
     }
     reader.page(&file.page, &mut config)?;
+    reader.alarms(&file.alarms, &mut config)?;
     config.given = given(&file);
     Ok(config)
 }
@@ -191,6 +204,27 @@ fn given(file: &File) -> Vec<Key> {
 }
 
 impl Reader<'_> {
+    fn alarms(&self, file: &Alarms, config: &mut Config) -> Result<(), ConfigError> {
+        config.alarms.rules.clone_from(&file.rules);
+        let line = self.number("alarms.gpio_line", &file.gpio_line, 0..=1023)?;
+        let levels = [Level::Warning, Level::Trip].map(|level| (level.name(), level));
+        let at = self.word("alarms.gpio_at", &file.gpio_at, &levels)?;
+        let Some(line) = line else { return Ok(()) };
+        if file.rules.is_none() {
+            let place = file.gpio_line.as_ref().map(|v| v.span().start);
+            let what = "alarms.gpio_line needs alarms.rules beside it";
+            return Err(self.error(place, what.to_owned()));
+        }
+        let usual = || PathBuf::from("/dev/gpiochip0");
+        config.alarms.contact = Some(ContactConfig {
+            chip: file.gpio_chip.clone().unwrap_or_else(usual),
+            line,
+            at: at.unwrap_or(Level::Trip),
+            fail_safe: file.gpio_fail_safe.as_ref().is_some_and(|v| *v.get_ref()),
+        });
+        Ok(())
+    }
+
     fn page(&self, file: &Page, config: &mut Config) -> Result<(), ConfigError> {
         let page = &mut config.page;
         if let Some(listen) = &file.listen {
@@ -323,6 +357,28 @@ mod tests {
 
     fn refused(text: &str) -> String {
         read(text, "f.toml").unwrap_err().to_string()
+    }
+
+    #[test]
+    fn a_contact_needs_rules_and_has_a_usual_chip() {
+        let text = "[alarms]\nrules = \"/etc/a.toml\"\ngpio_line = 17\ngpio_at = \"warning\"\ngpio_fail_safe = true";
+        let alarms = read(text, "f.toml").unwrap().alarms;
+        assert_eq!(alarms.rules, Some("/etc/a.toml".into()));
+        let contact = ContactConfig {
+            chip: "/dev/gpiochip0".into(),
+            line: 17,
+            at: Level::Warning,
+            fail_safe: true,
+        };
+        assert_eq!(alarms.contact, Some(contact));
+        assert_eq!(
+            refused("[alarms]\n\ngpio_line = 17"),
+            "f.toml:3: alarms.gpio_line needs alarms.rules beside it"
+        );
+        assert_eq!(
+            refused("[alarms]\nrules = \"a\"\ngpio_at = \"normal\""),
+            "f.toml:3: alarms.gpio_at is \"normal\": give warning or trip"
+        );
     }
 
     #[test]

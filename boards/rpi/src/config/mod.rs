@@ -10,6 +10,7 @@ use std::fmt;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::{Path, PathBuf};
 
+use rowtone::alarm::Level;
 use rowtone::link::settings::{Key, Settings};
 use rowtone_page::password::Hash;
 
@@ -28,8 +29,32 @@ pub struct Config {
     pub service: ServiceConfig,
     /// The page.
     pub page: PageConfig,
+    /// The alarms.
+    pub alarms: AlarmsConfig,
     /// The settings that the file names: there it has the last word.
     pub given: Vec<Key>,
+}
+
+/// The alarms of the machine.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct AlarmsConfig {
+    /// The file with their rules; no alarms where there is none.
+    pub rules: Option<PathBuf>,
+    /// The contact that shows them.
+    pub contact: Option<ContactConfig>,
+}
+
+/// A line of a GPIO chip.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ContactConfig {
+    /// The chip's device.
+    pub chip: PathBuf,
+    /// The line's number on it.
+    pub line: u32,
+    /// The level from which on it shows an alarm.
+    pub at: Level,
+    /// High while all is seen to be well, instead of high in alarm.
+    pub fail_safe: bool,
 }
 
 /// The page.
@@ -153,6 +178,7 @@ impl Config {
                 names: Vec::new(),
                 clip_bytes: 64 << 20,
             },
+            alarms: AlarmsConfig::default(),
             given: Vec::new(),
         }
     }
