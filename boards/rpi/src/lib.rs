@@ -39,4 +39,5 @@ pub mod setup;
 pub mod shared;
 pub mod store;
 pub mod system;
+pub mod trend;
 pub mod uart;

@@ -19,6 +19,7 @@ use rowtone_rpi::doctor;
 use rowtone_rpi::page;
 use rowtone_rpi::run::{self, log};
 use rowtone_rpi::shared::Shared;
+use rowtone_rpi::trend::Keeper;
 use rowtone_rpi::uart::TEXT;
 
 /// Where the configuration is unless told otherwise; it may be missing.
@@ -167,7 +168,10 @@ fn measure(cli: &Cli, config: &Config) -> ExitCode {
             return ExitCode::from(2);
         }
     };
-    let shared = Shared::new(config.settings).with_alarms(alarms);
+    let trend = config.service.trend.as_deref().and_then(Keeper::start);
+    let shared = Shared::new(config.settings)
+        .with_alarms(alarms)
+        .with_trend(trend);
     let shared = Arc::new(match &live {
         Some(live) => shared.with_page(Arc::clone(live)),
         None => shared,

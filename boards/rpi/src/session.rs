@@ -254,6 +254,9 @@ fn compute(
         // The core counts from the session's first frame, a board from its own start.
         let first = *first_ms.get_or_insert(report.time_ms);
         report.time_ms = ready.offset_ms + report.time_ms.saturating_sub(first);
+        if let Some(trend) = &shared.trend {
+            trend.push(&report);
+        }
         let said = shared.on_alarms(|desk| desk.window(&report));
         if let (Some(live), Some(shapes)) = (&shared.live, shapes) {
             page::report(

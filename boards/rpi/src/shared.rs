@@ -10,6 +10,7 @@ use rowtone_page::live::Live;
 
 use crate::alarms::Desk;
 use crate::alive::Pulses;
+use crate::trend::Keeper;
 
 /// What all threads share.
 #[derive(Debug)]
@@ -32,6 +33,8 @@ pub struct Shared {
     pub wish: Mutex<Option<PageWish>>,
     /// The machine's alarms; none where the configuration has no rules.
     pub alarms: Mutex<Option<Desk>>,
+    /// The way to the trend on the disk; none where the configuration has none.
+    pub trend: Option<Keeper>,
     /// When the program began.
     pub started: Instant,
 }
@@ -58,6 +61,7 @@ impl Shared {
             live: None,
             wish: Mutex::new(None),
             alarms: Mutex::new(None),
+            trend: None,
             started: Instant::now(),
         }
     }
@@ -78,6 +82,12 @@ impl Shared {
             alarms: Mutex::new(alarms),
             ..self
         }
+    }
+
+    /// The same with a trend.
+    #[must_use]
+    pub fn with_trend(self, trend: Option<Keeper>) -> Self {
+        Self { trend, ..self }
     }
 
     /// Does something with the alarms, where there are some.

@@ -30,6 +30,7 @@ pub mod shapes;
 pub mod simulate;
 #[cfg(feature = "lab")]
 pub mod sweep;
+pub mod trend;
 pub mod verify;
 pub mod window;
 
@@ -55,6 +56,8 @@ enum Command {
     Analyze(analyze::Args),
     /// Writes the motion over time as CSV, NPY or WAV
     Displacement(displacement::Args),
+    /// What a Raspberry Pi has kept of its machine's last hour, month and years, as CSV
+    Trend(trend::Args),
     /// Shows what vibrates where: amplitude and phase of each tone over the picture
     Shapes(shapes::Args),
     /// Decodes what a board sends over a serial port
@@ -98,6 +101,7 @@ fn run(command: &Command) -> Result<(), Failure> {
         Command::Demo(args) => demo::run(args),
         Command::Analyze(args) => analyze::run(args),
         Command::Displacement(args) => displacement::run(args),
+        Command::Trend(args) => trend::run(args),
         Command::Shapes(args) => shapes::run(args),
         Command::Monitor(args) => monitor::run(args),
         Command::Serve(args) => serve::run(args),

@@ -73,6 +73,7 @@ struct Service {
     realtime_priority: Maybe<u8>,
     silence_s: Maybe<f64>,
     state: Option<PathBuf>,
+    trend: Option<PathBuf>,
 }
 
 #[derive(Deserialize, Default)]
@@ -171,6 +172,7 @@ pub(super) fn read(text: &str, name: &str) -> Result<Config, ConfigError> {
     if let Some(state) = &service.state {
         config.service.state.clone_from(state);
     }
+    config.service.trend.clone_from(&service.trend);
     reader.page(&file.page, &mut config)?;
     reader.alarms(&file.alarms, &mut config)?;
     config.given = given(&file);
@@ -379,6 +381,12 @@ mod tests {
             refused("[alarms]\nrules = \"a\"\ngpio_at = \"normal\""),
             "f.toml:3: alarms.gpio_at is \"normal\": give warning or trip"
         );
+    }
+
+    #[test]
+    fn a_trend_is_kept_where_it_is_asked_for() {
+        let config = read("[service]\ntrend = \"/var/lib/t\"", "f.toml").unwrap();
+        assert_eq!(config.service.trend, Some("/var/lib/t".into()));
     }
 
     #[test]

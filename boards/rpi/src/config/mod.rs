@@ -138,6 +138,8 @@ pub struct ServiceConfig {
     pub silence_s: f64,
     /// Where settings are kept.
     pub state: PathBuf,
+    /// Where the trend is kept; nowhere where there is none.
+    pub trend: Option<PathBuf>,
 }
 
 /// Highest frequency where none is given, Hz.
@@ -171,6 +173,7 @@ impl Config {
                 realtime_priority: Some(50),
                 silence_s: 2.0,
                 state: PathBuf::from("/var/lib/rowtone-rpi/settings"),
+                trend: None,
             },
             page: PageConfig {
                 listen: Some((Ipv4Addr::UNSPECIFIED, 7357).into()),
