@@ -172,7 +172,8 @@ pub(super) fn read(text: &str, name: &str) -> Result<Config, ConfigError> {
     if let Some(state) = &service.state {
         config.service.state.clone_from(state);
     }
-    config.service.trend.clone_from(&service.trend);
+    let trend = service.trend.as_ref();
+    config.service.trend = trend.filter(|dir| !dir.as_os_str().is_empty()).cloned();
     reader.page(&file.page, &mut config)?;
     reader.alarms(&file.alarms, &mut config)?;
     config.given = given(&file);
