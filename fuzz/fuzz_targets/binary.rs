@@ -6,10 +6,7 @@ use rowtone::wire::{Message, binary};
 
 fn decoded(bytes: &[u8]) -> Vec<Message> {
     let mut decoder = binary::Decoder::<{ binary::MAX_FRAME }>::new();
-    bytes
-        .iter()
-        .filter_map(|&byte| decoder.push(byte)?.ok())
-        .collect()
+    bytes.iter().filter_map(|&byte| decoder.push(byte)?.ok()).collect()
 }
 
 fuzz_target!(|data: &[u8]| {
@@ -23,8 +20,7 @@ fuzz_target!(|data: &[u8]| {
     stuffed.push(0);
     for message in decoded(&stuffed) {
         let mut buffer = [0; binary::MAX_FRAME];
-        let again = binary::encode_to_slice(&message, &mut buffer)
-            .expect("what was decoded can be encoded");
+        let again = binary::encode_to_slice(&message, &mut buffer).expect("what was decoded can be encoded");
         assert_eq!(decoded(again), [message]);
     }
 });

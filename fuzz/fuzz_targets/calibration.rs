@@ -6,15 +6,9 @@ use rowtone_calibrate::Calibration;
 
 /// What is accepted is a camera that can be, and is read as the same again.
 fn read(text: &str) {
-    let Ok(calibration) = Calibration::from_toml(text) else {
-        return;
-    };
+    let Ok(calibration) = Calibration::from_toml(text) else { return };
     assert!(calibration.line_time_s > 0.0 && calibration.line_time_s.is_finite());
-    assert!(
-        calibration
-            .exposure_s
-            .is_none_or(|s| s > -1e-9 && s.is_finite())
-    );
+    assert!(calibration.exposure_s.is_none_or(|s| s > -1e-9 && s.is_finite()));
     if let Ok(timing) = calibration.timing() {
         assert!(timing.line_time_ps() > 0 && timing.rows() > 0);
     }
@@ -24,9 +18,7 @@ fn read(text: &str) {
 }
 
 fuzz_target!(|data: &[u8]| {
-    let Ok(text) = core::str::from_utf8(data) else {
-        return;
-    };
+    let Ok(text) = core::str::from_utf8(data) else { return };
     read(text);
     read(&format!("rows = 1080\nline_time_s = 1.89e-5\n{text}"));
 });

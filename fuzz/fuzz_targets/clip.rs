@@ -1,15 +1,13 @@
 //! `rowtone_clip`: any bytes as a Y4M stream, behind a right header and without one, and as frame times.
 #![no_main]
 
-use libfuzzer_sys::fuzz_target;
 use rowtone_clip::pts;
 use rowtone_clip::y4m::{Next, Reader};
+use libfuzzer_sys::fuzz_target;
 
 /// Reads until the end, and checks that what is called a frame is one.
 fn read(bytes: &[u8]) {
-    let Ok(mut reader) = Reader::open(bytes, "clip") else {
-        return;
-    };
+    let Ok(mut reader) = Reader::open(bytes, "clip") else { return };
     let marker = b"FRAME\n".len();
     let planes = reader.stride() - marker;
     assert!(reader.header_bytes() <= bytes.len());

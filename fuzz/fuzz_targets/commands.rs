@@ -8,24 +8,11 @@ use rowtone::link::settings::store::{Nowhere, Started};
 use rowtone::link::settings::{Board, Console, Limits, Settings};
 use rowtone::wire::{SettingsOrigin, text};
 
-const LIMITS: Limits = Limits {
-    width: 320,
-    height: 240,
-    min_width: 16,
-    max_window_s: 10.0,
-};
+const LIMITS: Limits = Limits { width: 320, height: 240, min_width: 16, max_window_s: 10.0 };
 
 fuzz_target!(|data: &[u8]| {
-    let board = Board {
-        version: [0; 3],
-        limits: LIMITS,
-        defaults: Settings::default(),
-    };
-    let started = Started {
-        session: 1,
-        settings: None,
-        origin: SettingsOrigin::Defaults,
-    };
+    let board = Board { version: [0; 3], limits: LIMITS, defaults: Settings::default() };
+    let started = Started { session: 1, settings: None, origin: SettingsOrigin::Defaults };
     let mut console = Console::new(board, started).expect("the defaults are valid");
     let mut slots = [const { None }; 2];
     let mut outbox = Outbox::new(&mut slots);

@@ -4,18 +4,13 @@
 use libfuzzer_sys::fuzz_target;
 use rowtone::link::Link;
 use rowtone::link::outbox::Outbox;
+use rowtone::report::Report;
 use rowtone::link::settings::store::{Nowhere, Started};
 use rowtone::link::settings::{Board, Console, Limits, Settings};
-use rowtone::report::Report;
 use rowtone::wire::Format;
 use rowtone::wire::{Message, SettingsOrigin, binary, text};
 
-const LIMITS: Limits = Limits {
-    width: 320,
-    height: 240,
-    min_width: 16,
-    max_window_s: 10.0,
-};
+const LIMITS: Limits = Limits { width: 320, height: 240, min_width: 16, max_window_s: 10.0 };
 
 fn report() -> Report {
     Report {
@@ -30,23 +25,10 @@ fn report() -> Report {
 
 // A byte of 0xf0 and above does something; all others go to the board as they are.
 fuzz_target!(|data: &[u8]| {
-    let Some((&first, data)) = data.split_first() else {
-        return;
-    };
+    let Some((&first, data)) = data.split_first() else { return };
     let wire = [Format::Text, Format::Binary, Format::Modbus][usize::from(first) % 3];
-    let board = Board {
-        version: [0; 3],
-        limits: LIMITS,
-        defaults: Settings {
-            wire,
-            ..Settings::default()
-        },
-    };
-    let started = Started {
-        session: 1,
-        settings: None,
-        origin: SettingsOrigin::Defaults,
-    };
+    let board = Board { version: [0; 3], limits: LIMITS, defaults: Settings { wire, ..Settings::default() } };
+    let started = Started { session: 1, settings: None, origin: SettingsOrigin::Defaults };
     let console = Console::new(board, started).expect("the defaults are valid");
     let mut slots = [const { None }; 3];
     let mut link = Link::new(console, Outbox::new(&mut slots), 115_200);
@@ -93,14 +75,10 @@ fuzz_target!(|data: &[u8]| {
     };
     if was(Format::Text) && !switched {
         let mut decoder = text::Decoder::<{ text::MAX_LINE }>::new();
-        said.iter()
-            .filter_map(|&byte| decoder.push(byte))
-            .for_each(|heard| take(heard.expect("a whole sentence")));
+        said.iter().filter_map(|&byte| decoder.push(byte)).for_each(|heard| take(heard.expect("a whole sentence")));
     } else if was(Format::Binary) && !switched {
         let mut decoder = binary::Decoder::<{ binary::MAX_FRAME }>::new();
-        said.iter()
-            .filter_map(|&byte| decoder.push(byte))
-            .for_each(|heard| take(heard.expect("a whole frame")));
+        said.iter().filter_map(|&byte| decoder.push(byte)).for_each(|heard| take(heard.expect("a whole frame")));
     } else {
         return;
     }

@@ -7,9 +7,7 @@ use rowtone_page::http::request::{MAX_BODY, MAX_HEAD, parse};
 use rowtone_page::password::Hash;
 
 fuzz_target!(|data: &[u8]| {
-    let Ok(Some((head, length))) = parse(data) else {
-        return;
-    };
+    let Ok(Some((head, length))) = parse(data) else { return };
     assert!(length <= MAX_HEAD.min(data.len()) && head.content_length <= MAX_BODY);
     assert!(head.path.starts_with('/'));
     // Shorter it is none yet, longer it is the same.

@@ -72,20 +72,14 @@ fn slot(version: u8, number: u32, content: &[u8]) -> [u8; SLOT_LEN] {
 
 // First byte: which slots are valid by their checksum. Then when and where the power goes, and the content.
 fuzz_target!(|data: &[u8]| {
-    let [kind, writes, done, number, content @ ..] = data else {
-        return;
-    };
+    let [kind, writes, done, number, content @ ..] = data else { return };
     let (first, second) = content.split_at(content.len() / 2);
     let mut bytes = [0xff; 2 * SLOT_LEN];
     for (at, content) in [(0, first), (1, second)] {
         let part = &mut bytes[at * SLOT_LEN..][..SLOT_LEN];
         if kind & (1 << at) != 0 {
             let version = 1 + (kind >> 2 & 1);
-            part.copy_from_slice(&slot(
-                version,
-                u32::from(*number).wrapping_add(at as u32).wrapping_sub(1),
-                content,
-            ));
+            part.copy_from_slice(&slot(version, u32::from(*number).wrapping_add(at as u32).wrapping_sub(1), content));
         } else {
             let len = content.len().min(SLOT_LEN);
             part[..len].copy_from_slice(&content[..len]);
@@ -105,20 +99,14 @@ fuzz_target!(|data: &[u8]| {
     flash.cut = Some((writes % 4, *done));
     let mut store = Store::new(flash, 0).expect("two slots fit");
     let began = store.start();
-    let new = |window_s| Settings {
-        window_s,
-        ..Settings::default()
-    };
+    let new = |window_s| Settings { window_s, ..Settings::default() };
     let first = store.save(began.session, &new(2.0));
     let second = store.save(began.session, &new(3.0));
     let mut flash = store.into_flash();
     flash.cut = None;
     let after = Store::new(flash, 0).expect("two slots fit").start();
     let one_of = [began.settings, Some(new(2.0)), Some(new(3.0))];
-    assert!(
-        one_of.into_iter().any(|one| same(after.settings, one)),
-        "{after:?}"
-    );
+    assert!(one_of.into_iter().any(|one| same(after.settings, one)), "{after:?}");
     if second.is_ok() {
         assert_eq!(after.settings, Some(new(3.0)));
     } else if first.is_ok() {

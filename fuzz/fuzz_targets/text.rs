@@ -19,9 +19,7 @@ fuzz_target!(|data: &[u8]| {
         }
     }
     let sum = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(data);
-    let Ok(body) = core::str::from_utf8(data) else {
-        return;
-    };
+    let Ok(body) = core::str::from_utf8(data) else { return };
     let line = format!("${body}*{sum:08X}\r\n");
     if let Ok(message) = text::decode_line(&line) {
         // A line with more digits than an f32 has comes back with fewer, but means the same.

@@ -10,9 +10,7 @@ use rowtone_clip::{Clock, Stamped, Times};
 
 /// What is understood is a video that can be measured, and its times make a clock that runs forward.
 fn answer(bytes: &[u8]) {
-    let Ok(found) = probe::parse(bytes) else {
-        return;
-    };
+    let Ok(found) = probe::parse(bytes) else { return };
     assert!(found.width > 0 && found.height > 0);
     assert!(found.key_frames <= found.frames);
     assert!([0, 90, 180, 270].contains(&found.rotation_deg));
@@ -22,15 +20,11 @@ fn answer(bytes: &[u8]) {
 }
 
 fn run_clock(times_ns: &[i64], fps: Option<f64>) {
-    let Some(stamped) = Stamped::new(times_ns.to_vec(), fps, None) else {
-        return;
-    };
+    let Some(stamped) = Stamped::new(times_ns.to_vec(), fps, None) else { return };
     let mut clock = Clock::Stamped(stamped);
     let mut last = None;
     for (index, &stamp) in (0..).zip(times_ns) {
-        let Some((number, _)) = clock.frame(index, Some(stamp)) else {
-            panic!("a stamp without a time")
-        };
+        let Some((number, _)) = clock.frame(index, Some(stamp)) else { panic!("a stamp without a time") };
         assert!(last.is_none_or(|last| last < number || number == u32::MAX));
         last = Some(number);
     }
@@ -38,11 +32,7 @@ fn run_clock(times_ns: &[i64], fps: Option<f64>) {
 
 /// Frame times of any steps, some of them a millisecond's multiples.
 fn steps(bytes: &[u8]) {
-    let unit = if bytes.first().is_some_and(|b| b & 1 == 0) {
-        1_000_000
-    } else {
-        1
-    };
+    let unit = if bytes.first().is_some_and(|b| b & 1 == 0) { 1_000_000 } else { 1 };
     let times: Vec<i64> = bytes
         .chunks_exact(4)
         .scan(0_i64, |time, step| {
