@@ -101,7 +101,7 @@ impl<'a> Reporter<'a> {
 fn velocity_mm_s(tones: &Tones, um_per_px: f32) -> f32 {
     let broad = tones.broad_band.and_then(|b| b.sum.velocity_px_s);
     match broad {
-        Some(px_s) => px_s.value * um_per_px * 1e-3,
+        Some(px_s) => px_s.value * (um_per_px * 1e-3),
         None => band_velocity(tones, um_per_px),
     }
 }

@@ -5,8 +5,10 @@ use std::thread;
 
 use rowtone::report::{Warning, Warnings};
 use rowtone::timeline::{Displacement, Group, Sample};
+use rowtone::tracker::Axes;
 
 use super::codec;
+use super::columns::{self, Steadiness};
 use super::region::{self, Choice, Region};
 use super::together::Together;
 use super::{Chosen, Ending, Engine, Finale, FrameShifts, Wanted, background};
@@ -55,6 +57,7 @@ fn measure_all(
     let memory_for = |part: &Rect| TrackerMemory::for_axes(part.width, part.height, axes);
     let mut memory = memory_for(&part);
     let mut still_memory = feed.camera.background.as_ref().map(memory_for);
+    let mut across_memory = None;
     let (kept, more) = keep_first(feed);
     let early = &kept[..kept.len().min(to_choose_by(feed))];
     if kept.len() < 2 {
@@ -129,6 +132,27 @@ fn measure_all(
             chosen.keyed = keyed;
         }
     } else {
+        let both = (axes == Axes::Xy && feed.camera.background.is_none())
+            .then(|| Steadiness::of(&mut lines.moving, first));
+        if let Some(both) = both.filter(|both| !both.is_plain(seen.height, first.len())) {
+            let room =
+                across_memory.insert(TrackerMemory::for_axes(part.width, part.height, Axes::X));
+            let camera = feed.camera.clone();
+            feed.camera.axes = Axes::X;
+            let across = Lines::new(feed, part, &region, groups, room, None);
+            feed.camera = camera;
+            let mut across = across?.learned(first);
+            let chosen = lines.chosen;
+            lines = match Steadiness::of(&mut across.moving, first).tells_of_loss(&both) {
+                true => {
+                    notes.push(columns::LOST.to_owned());
+                    across
+                }
+                // What was measured may have led it astray.
+                false => Lines::new(feed, part, &region, groups, &mut memory, None)?.learned(first),
+            };
+            lines.chosen = chosen;
+        }
         // A codec leaves no pattern of the sensor's.
         lines.mend_pattern(&kept);
     }
@@ -326,6 +350,13 @@ impl<'a> Lines<'a> {
             self.learn_roughly(first);
             choice.join().unwrap_or_else(|panic| resume_unwind(panic))
         })
+    }
+
+    /// After both rounds of learning.
+    fn learned(mut self, first: &[Frame]) -> Self {
+        self.learn_roughly(first);
+        self.learn(first, 1);
+        self
     }
 
     /// The first round only has to find the motion: some frames, spread over all of them, will do.

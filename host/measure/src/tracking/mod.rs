@@ -9,6 +9,7 @@
 
 mod background;
 mod codec;
+mod columns;
 mod engine;
 mod lines;
 mod pattern;
