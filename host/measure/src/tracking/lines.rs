@@ -134,23 +134,23 @@ fn measure_all(
     } else {
         let both = (axes == Axes::Xy && feed.camera.background.is_none())
             .then(|| Steadiness::of(&mut lines.moving, first));
-        if let Some(both) = both.filter(|both| !both.is_plain(seen.height, first.len())) {
-            let room =
-                across_memory.insert(TrackerMemory::for_axes(part.width, part.height, Axes::X));
-            let camera = feed.camera.clone();
-            feed.camera.axes = Axes::X;
-            let across = Lines::new(feed, part, &region, groups, room, None);
-            feed.camera = camera;
-            let mut across = across?.learned(first);
+        if let Some(both) = both {
             let chosen = lines.chosen;
-            lines = match Steadiness::of(&mut across.moving, first).tells_of_loss(&both) {
-                true => {
+            // What was measured may have led it astray: it learns anew.
+            lines = Lines::new(feed, part, &region, groups, &mut memory, None)?.learned(first);
+            if !both.is_plain(seen.height, first.len()) {
+                let room =
+                    across_memory.insert(TrackerMemory::for_axes(part.width, part.height, Axes::X));
+                let camera = feed.camera.clone();
+                feed.camera.axes = Axes::X;
+                let across = Lines::new(feed, part, &region, groups, room, None);
+                feed.camera = camera;
+                let mut across = across?.learned(first);
+                if Steadiness::of(&mut across.moving, first).tells_of_loss(&both) {
                     notes.push(columns::LOST.to_owned());
-                    across
+                    lines = across;
                 }
-                // What was measured may have led it astray.
-                false => Lines::new(feed, part, &region, groups, &mut memory, None)?.learned(first),
-            };
+            }
             lines.chosen = chosen;
         }
         // A codec leaves no pattern of the sensor's.
